@@ -42,29 +42,24 @@ if TYPE_CHECKING:
     from ballplate.extensions.judgement.interface import budget, compare_models, validate
     from ballplate.extensions.laboratory.interface import read_report
     from ballplate.extensions.maps.interface import (
-        adjust,
-        convert,
         correct,
         curves,
         diff,
-        lengths,
         map,
     )
-    from ballplate.extensions.pages.interface import page, view
+    from ballplate.extensions.pages.interface import page
     from ballplate.extensions.reliability.interface import reliability
     from ballplate.extensions.repair.interface import repair
     from ballplate.extensions.reproduction.interface import reproduce
     from ballplate.extensions.requirements.interface import reach
     from ballplate.extensions.splines.interface import spline
-    from ballplate.extensions.sweeps.interface import stored, sweep, sweep_report
+    from ballplate.extensions.sweeps.interface import stored, sweep
     from ballplate.extensions.sweeps.running import OtherSweepError
     from ballplate.extensions.sweeps.store_file import StoreError
     from ballplate.planning.criteria import Criterion
     from ballplate.presentation.files import write_file
     from ballplate.presentation.result import Result
-    from ballplate.presentation.table import Table
     from ballplate.results.fits import Fit
-    from ballplate.results.groupings import GROUPINGS
     from ballplate.results.prediction import Prediction
     from ballplate.simulator.computing.processes import in_processes
     from ballplate.simulator.design.arrays import Design, Observations
@@ -112,7 +107,6 @@ __all__ = [
     "Extension",
     "Fit",
     "FittedMap",
-    "GROUPINGS",
     "Influence",
     "LinearFunctions",
     "Linearisation",
@@ -127,17 +121,14 @@ __all__ = [
     "QuantityKind",
     "Result",
     "StoreError",
-    "Table",
     "Target",
     "Trust",
-    "adjust",
     "assumptions",
     "budget",
     "certificate",
     "check",
     "compare",
     "compare_models",
-    "convert",
     "correct",
     "curves",
     "design",
@@ -147,7 +138,6 @@ __all__ = [
     "in_processes",
     "information",
     "lay_out",
-    "lengths",
     "linear_functions",
     "linearise",
     "load",
@@ -169,9 +159,7 @@ __all__ = [
     "spline",
     "stored",
     "sweep",
-    "sweep_report",
     "validate",
-    "view",
     "write_file",
     "write_map",
 ]
@@ -206,11 +194,7 @@ def __getattr__(name: str) -> Any:
         try:
             value = function(name)
         except KeyError:
-            from ballplate.simulator.inputs.moved import MOVED
-
-            successor = MOVED.get(f"bp.{name}")
-            moved = "" if successor is None else f"; it is now {successor}"
-            message = f"module {__name__!r} has no attribute {name!r}{moved}"
+            message = f"module {__name__!r} has no attribute {name!r}"
             raise AttributeError(message) from None
         except MissingExtensionError as error:
             raise MissingNameError(f"{__name__}.{name}: {error}") from None

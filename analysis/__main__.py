@@ -19,7 +19,7 @@ OBJECTS_BETWEEN_SEARCHES = 150_000
 
 def _leave(number: int, _: object) -> None:
     status, word = ANSWERS[signal.Signals(number).name]
-    os.write(2, f"{word}; no file was written\n".encode())
+    os.write(2, f"{word}\n".encode())
     os._exit(status)
 
 

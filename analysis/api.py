@@ -10,8 +10,7 @@ and TypeError for one of another type.
 from __future__ import annotations
 
 import os
-import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, overload
 
@@ -24,7 +23,7 @@ from ballplate.simulator.inputs.arguments import (
     ensure_type,
     ensure_whole,
 )
-from ballplate.simulator.inputs.extensions import optional_function, service
+from ballplate.simulator.inputs.extensions import service
 
 from .arguments import SIGMAS, PathLike, experiment_of, load, observed_of, table_of
 from .estimators.estimator_choice import (
@@ -33,7 +32,6 @@ from .estimators.estimator_choice import (
     EstimatorName,
     takers,
 )
-from .results.groupings import GROUPINGS, Grouping
 from .simulator.experiment.loading import load as load_file
 from .simulator.experiment.model import Experiment
 
@@ -43,7 +41,6 @@ if TYPE_CHECKING:
     from .arguments import Tables
     from .estimators.distances import EstimatorComparison
     from .planning.criteria import CriterionName
-    from .planning.orders import OrderName
     from .planning.selection import Campaign
     from .presentation.result import FitResult
     from .results.fits import Fit
@@ -194,7 +191,6 @@ def fit(
     monomials: bool = False,
     certificate: PathLike | pandas.DataFrame | None = None,
     *,
-    components: Grouping | None = None,
     columns: Mapping[str, object] | None = None,
     unit: str | None = None,
     coordinates: str | None = None,
@@ -202,10 +198,6 @@ def fit(
     fill_down: bool | None = None,
     sheet: str | None = None,
     swap_names: bool | None = None,
-    trials: int | None = None,
-    seed: int | None = None,
-    workers: int = 1,
-    report: Report = unreported,
 ) -> Fit: ...
 
 
@@ -222,7 +214,6 @@ def fit(
     scale: Literal["x", "y", "split", "none"] | None = None,
     offsets: bool = True,
     *,
-    components: Grouping | None = None,
     columns: Mapping[str, object] | None = None,
     unit: str | None = None,
     coordinates: str | None = None,
@@ -230,10 +221,6 @@ def fit(
     fill_down: bool | None = None,
     sheet: str | None = None,
     swap_names: bool | None = None,
-    trials: int | None = None,
-    seed: int | None = None,
-    workers: int = 1,
-    report: Report = unreported,
 ) -> FitResult: ...
 
 
@@ -249,7 +236,6 @@ def fit(
     scale: Literal["x", "y", "split", "none"] | None = None,
     offsets: bool = True,
     *,
-    components: Grouping | None = None,
     columns: Mapping[str, object] | None = None,
     unit: str | None = None,
     coordinates: str | None = None,
@@ -257,10 +243,6 @@ def fit(
     fill_down: bool | None = None,
     sheet: str | None = None,
     swap_names: bool | None = None,
-    trials: int | None = None,
-    seed: int | None = None,
-    workers: int = 1,
-    report: Report = unreported,
 ) -> FitResult:
     """The estimate from readings: a table or several, or those that the experiment's file names;
     also reports of measuring programs, as `read_report` reads them.
@@ -274,9 +256,7 @@ def fit(
     coefficients of t, t^2, ... on [0, 1]. A `certificate` has values instead of the experiment's
     own. Of the `ballplate.ESTIMATORS` those of distances take `pairs` of balls, also
     `across_probes`, and reversal takes the axis that has the `scale` difference, and whether
-    `offsets` between its positions are estimated. With `components`, one of the
-    `ballplate.GROUPINGS`, variances of groups of observations are estimated. With `trials` so many
-    data sets of the fitted parameters are fitted as well, from a `seed` and by several `workers`.
+    `offsets` between its positions are estimated.
     What is to be known beside the figures is in the result's `remarks`, `warnings` and `complaint`.
 
     >>> readings = simulate(quickstart())
@@ -288,8 +268,6 @@ def fit(
     <AlternativeFit of quickstart: distances, converged, full rank>
     """
     from .estimators.estimator_choice import fit_readings
-    from .montecarlo.trial_runs import MOST_TRIALS
-    from .results.fits import Fit
 
     ensure_one_of(SIGMAS, sigma=sigma)
     ensure_one_of(ESTIMATORS, estimator=str(estimator))
@@ -297,17 +275,8 @@ def fit(
     ensure_one_of(("x", "y", "split", "none"), scale=scale)
     ensure_type(bool, "True or False", monomials=monomials, across_probes=across_probes)
     ensure_type(bool, "True or False", offsets=offsets)
-    if components is not None:
-        ensure_one_of(GROUPINGS, components=components)
     asked: dict[str, object] = {"scale": scale, "offsets": not offsets, "pairs": pairs}
     asked |= {"across_probes": across_probes, "monomials": monomials}
-    asked |= {"components": components, "trials": trials}
-    ensure_whole(1, MOST_TRIALS, trials=trials)
-    ensure_whole(0, seed=seed)
-    ensure_whole(1, workers=workers)
-    ensure_report(report)
-    if trials is None and (seed is not None or workers != 1):
-        raise ValueError("seed and workers apply to trials only; leave them out")
     wrong = takers(estimator, [name for name, value in asked.items() if value])
     if wrong is not None:
         raise ValueError(f"{wrong[0]} applies to the estimator {wrong[1]} only; leave it out")
@@ -320,7 +289,7 @@ def fit(
     column_settings |= {"fill_down": fill_down, "sheet": sheet}
     chosen_experiment = experiment_of(experiment).with_readings(column_settings)
     chosen, observed = observed_of(chosen_experiment, readings, certificate)
-    fit_result = fit_readings(
+    return fit_readings(
         chosen,
         observed,
         estimator,
@@ -330,11 +299,7 @@ def fit(
         across_probes,
         scale,
         offsets,
-        components,
     )
-    if trials is None or not isinstance(fit_result, Fit) or not fit_result.converged:
-        return fit_result
-    return fit_result.with_trials(trials, chosen.seed if seed is None else seed, workers, report)
 
 
 def compare(
@@ -387,8 +352,6 @@ def plan(
     done: PathLike | pandas.DataFrame | None = None,
     moved: bool = False,
     earlier: PathLike | None = None,
-    order: OrderName | None = None,
-    drift: Sequence[str] = (),
     report: Report = unreported,
 ) -> Campaign:
     """Choose positions and certificates from the experiment's pool within a limit, with the bound
@@ -397,8 +360,7 @@ def plan(
     Without a limit the choice may cost as much as the positions of the experiment. Readings that
     are `done` already are kept; if the artefact has `moved` since, a position interrupted there
     can only be set up again. `earlier` is the file of an earlier choice from this pool, to compare
-    with and continue. An `order`, change-over, mirrored, blocks or least-drift, or sizes of a
-    `drift` such as ["0.5 um/h", "0.2 ppm/h"] add the effect of drift in each order.
+    with and continue.
 
     >>> corners = {"x": ["50 mm"], "y": ["50 mm"]}
     >>> places = {"planes": ["z"], "levels": ["100 mm", "400 mm"], "corners": corners}
@@ -409,7 +371,6 @@ def plan(
     from .planning.campaign_choice import Request, campaign
     from .planning.constraints import HOUR, Budget
     from .planning.criteria import NAMES
-    from .planning.orders import ORDERS
     from .simulator.experiment.loading import with_pool
 
     ensure_one_of(NAMES, criterion=str(criterion))
@@ -421,9 +382,7 @@ def plan(
     budget = None
     if (hours, positions, readings) != (None, None, None):
         budget = Budget(None if hours is None else HOUR * hours, readings, positions)
-    if order is not None:
-        ensure_one_of(tuple(ORDERS), order=order)
-    request = Request(criterion, budget, curve, seed, order, tuple(drift))
+    request = Request(criterion, budget, curve, seed)
     loaded = load_file(experiment, True) if isinstance(experiment, str | os.PathLike) else ()
     chosen = loaded[0] if len(loaded) == 1 else with_pool(experiment_of(experiment))
     done_table = None if done is None else table_of("done", done)
@@ -435,7 +394,7 @@ def plan(
 
 
 def load_map(path: PathLike) -> FittedMap:
-    """The map of a file that a fit left behind, YAML or .npz.
+    """The map of a file that a fit left behind.
 
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
@@ -451,12 +410,12 @@ def load_map(path: PathLike) -> FittedMap:
 
 
 def write_map(fitted: FittedMap, path: PathLike) -> None:
-    """Write what `to_map()` of a fit gives into a file: YAML, or arrays of NumPy where its name
-    ends in .npz. Numbers keep all their digits; a file of that name is overwritten.
+    """Write what `to_map()` of a fit gives into a file in YAML. Numbers keep all their digits; a
+    file of that name is overwritten.
 
     >>> from tempfile import TemporaryDirectory
     >>> with TemporaryDirectory() as folder:
-    ...     path = f"{folder}/map.npz"
+    ...     path = f"{folder}/map.yaml"
     ...     write_map(fit(quickstart(), simulate(quickstart())).to_map(), path)
     ...     load_map(path).degrees_of_freedom
     580
@@ -467,23 +426,3 @@ def write_map(fitted: FittedMap, path: PathLike) -> None:
     ensure_type(FittedMap, "what to_map() of a fit gives", fitted=fitted)
     ensure_path("path", path)
     map_files.write_map(fitted, path)
-
-
-def _shown_in_notebook(experiment: Experiment) -> str:
-    """Return the notebook view of an experiment: its table and its picture, which the experiment
-    itself cannot draw.
-    """
-    view = optional_function("view")
-    picture = "" if view is None else view(experiment)._repr_html_()
-    return experiment._repr_html_() + picture
-
-
-def _teach_notebook() -> None:
-    """Let the session of IPython, if this is one, show experiments so."""
-    session = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
-    if session is not None:
-        formatter = session.display_formatter.formatters["text/html"]
-        formatter.for_type(Experiment, _shown_in_notebook)
-
-
-_teach_notebook()

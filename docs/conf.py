@@ -8,7 +8,14 @@ sys.path.insert(0, str(HERE / "_extensions"))
 
 project = "ballplate"
 author = copyright = "The ballplate authors"
-extensions = ["myst_parser", "sphinx.ext.autodoc", "console_examples", "generated_pages", "mathml"]
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "console_examples",
+    "generated_pages",
+    "limit_tables",
+    "mathml",
+]
 exclude_patterns = ["_build", "_extensions"]
 nitpicky = True
 # Types in signatures are those of NumPy, pandas and Python, whose pages are not at hand.

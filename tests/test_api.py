@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import json
-import sqlite3
-from collections.abc import Callable
-from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +10,6 @@ import ballplate as bp
 import pytest
 import yaml
 from ballplate.cli import main
-
-from tests.reference.tables import read_table
 
 QUICKSTART = "designs/quickstart.yaml"
 
@@ -41,7 +36,6 @@ def test_results_are_those_of_the_commands(
     assert bp.reliability(QUICKSTART).to_dict() == printed(
         capsys, "run", "--reliability", QUICKSTART
     )
-    assert bp.reach(QUICKSTART).to_dict() == printed(capsys, "reach", QUICKSTART)
 
 
 def test_a_changed_experiment_is_one_with_the_text_changed(tmp_path: Path) -> None:
@@ -108,65 +102,6 @@ def test_an_experiment_written_in_python(tmp_path: Path) -> None:
         bp.experiment({"variants": {}})
 
 
-@pytest.mark.parametrize(
-    ("call", "told"),
-    [
-        (lambda: bp.run(QUICKSTART, trials=0), "trials=0; give 2 at least"),
-        (lambda: bp.run(QUICKSTART, trials=1), "trials=1; give 2 at least"),
-        (lambda: bp.run(QUICKSTART, until=0.0), r"until=0.0; give a ratio above 0"),
-        (lambda: bp.run(QUICKSTART, until=5), r"until=5; give a ratio above 0 and at most 1"),
-        (
-            lambda: bp.fit(QUICKSTART, "none.csv", sigma="givn"),
-            'sigma: "givn" is unknown; did you mean "given"',
-        ),
-        (
-            lambda: bp.reliability(QUICKSTART, sigma="Given"),
-            'sigma: "Given" is unknown; did you mean "given"',
-        ),
-        (lambda: bp.reliability(QUICKSTART, power=1.0), "power=1.0; give a ratio between"),
-        (
-            lambda: bp.reliability(QUICKSTART, false_alarm=0.9),
-            "false_alarm=0.9, power=0.8; .* the power the larger",
-        ),
-        (lambda: bp.plan(QUICKSTART, "u6"), 'criterion: "u6" is unknown; did you mean "U6"'),
-        (
-            lambda: bp.reach(QUICKSTART, unknowns=["repeatabilty"]),
-            'unknowns: "repeatabilty" is unknown; did you mean',
-        ),
-        (
-            lambda: bp.plan("designs/planning/plate-pool.yaml", hours=-1.0),
-            "hours=-1.0; give hours above 0",
-        ),
-        (
-            lambda: bp.plan("designs/planning/plate-pool.yaml", positions=0),
-            "positions=0; give 1 at least",
-        ),
-        (lambda: bp.run(QUICKSTART, until=float("nan")), "until=nan; give a ratio above 0"),
-        (
-            lambda: bp.sweep("designs/sweeps/plate-size.yaml", workers=0),
-            "workers=0; give 1 at least",
-        ),
-        (
-            lambda: bp.reach(QUICKSTART, unknowns="rows"),
-            'unknowns: "rows" is unknown; known: repeatability',
-        ),
-        (lambda: bp.budget(QUICKSTART, by=None), 'by: "None" is unknown; known: axis'),  # type: ignore[arg-type]
-        (
-            lambda: bp.diff("a.yaml", "b.yaml", dates=("2026-11-22",)),  # type: ignore[arg-type]
-            "dates=.*; give two",
-        ),
-    ],
-)
-def test_wrong_arguments_are_refused(call: Callable[[], object], told: str) -> None:
-    with pytest.raises(ValueError, match=told):
-        call()
-
-
-def test_a_single_unknown_needs_no_list() -> None:
-    (answer,) = bp.reach(QUICKSTART, "U6 average 0.2 um", "repeatability").answers
-    assert answer.name == "repeatability"
-
-
 def test_variants_are_chosen_by_name() -> None:
     with pytest.raises(bp.ExperimentError, match="several variants; choose one"):
         bp.load("designs/npl/6.1.1.yaml")
@@ -174,67 +109,3 @@ def test_variants_are_chosen_by_name() -> None:
         bp.load("designs/npl/6.1.1.yaml", variant="E")
     with pytest.raises(bp.ExperimentError, match="the file has no variants"):
         bp.load(QUICKSTART, variant="A")
-
-
-def test_results_show_themselves() -> None:
-    for result in (
-        bp.check(QUICKSTART),
-        bp.run(QUICKSTART, trials=5),
-        bp.fit(QUICKSTART, bp.simulate(QUICKSTART)),
-    ):
-        assert len(repr(result)) < 200 and "quickstart" in repr(result)
-        assert str(result).startswith("quickstart: 5 x 5 ball plate in six positions\n")
-        assert len(result.to_frame()) == len(result.rows())
-        html = result._repr_html_()
-        assert (
-            html.count("<table") == html.count("</table>") == bool(result.rows())
-            and "quickstart" in html
-        )
-        json.dumps(result.to_dict(), allow_nan=False)
-
-
-def test_a_sweep_goes_on_where_it_ended(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "base.yaml").write_text(Path(QUICKSTART).read_text("utf-8"), "utf-8")
-    text = (
-        "title: repeatability\nbase: base.yaml\naxes: {u: {path: machine.repeatability, values:"
-        " [0.1 um, 0.2 um]}}\n"
-    )
-    file, store = tmp_path / "small.yaml", tmp_path / "small.sqlite"
-    file.write_text(text, "utf-8")
-    found = bp.sweep(file)
-    assert (
-        found.summary.done == 2
-        and found.summary.before == 0
-        and repr(found).endswith("2 cases, 2 done, 0 failed>")
-    )
-    assert len(found.to_frame()) == 2 and found.to_dict()["store"] == str(store)
-    again = bp.sweep(file)
-    assert again.summary.before == 2 and again.remarks == ()
-    with closing(sqlite3.connect(store)) as connection, connection:
-        connection.execute("UPDATE result SET figures = '{}' WHERE rowid = 1")
-    damaged = bp.stored(store)
-    assert damaged.summary.done == 1 and damaged.summary.left == 1
-    assert "1 unreadable case" in damaged.remarks[0]
-    mended = bp.sweep(file)
-    assert mended.summary.before == 1 and mended.summary.done == 2
-    assert "replaced in this run" in mended.remarks[0] and mended.remarks[0] in str(mended)
-    assert main(["sweep", "--export", str(store), "-o", str(tmp_path / "table.csv")]) == 0
-    exported = read_table(tmp_path / "table.csv")
-    assert exported["U6_average_m"].tolist() == found.table["U6_average_m"].tolist()
-    assert bp.stored(store).to_frame().equals(mended.to_frame())
-    assert (
-        main(["sweep", "--report", str(store), "--format", "csv", "-o", str(tmp_path / "r.csv")])
-        == 0
-    )
-    assert (tmp_path / "r.csv").read_text("utf-8") == bp.sweep_report(store, form="csv")
-    file.write_text(text.replace("0.2 um", "0.3 um"), "utf-8")
-    with pytest.raises(bp.OtherSweepError, match="holds another sweep; what has changed"):
-        bp.sweep(file)
-    assert bp.sweep(file, beside=True).summary.before == 1
-    assert len({bp.stored(store, k).to_frame()["U6_average_m"][1] for k in (1, 2)}) == 2
-    with pytest.raises(bp.StoreError, match="no such sweep; it has 1, 2"):
-        bp.stored(store, 3)
-    store.write_text("no store", "utf-8")
-    for use in (lambda: bp.sweep(file), lambda: bp.stored(store), lambda: bp.sweep_report(store)):
-        with pytest.raises(bp.StoreError, match="is no store of ballplate sweep"):
-            use()

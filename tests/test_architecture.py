@@ -160,6 +160,7 @@ def test_beside_the_rooms_there_is_only_the_face() -> None:
         "analysis/__main__.py",
         "analysis/api.py",
         "analysis/models.py",
+        "analysis/testing.py",
         "analysis/arguments.py",
         "simulator/__init__.py",
     }

@@ -137,9 +137,10 @@ def test_what_the_table_names_is_there(extension: Extension) -> None:
     for name, listed in extension.commands.items():
         command = extension.load(listed.module)
         assert listed.help and command.DESCRIPTION and command.run and command.add_options, name
-    for kind in ("functions", "services"):
-        for name, module in getattr(extension, kind).items():
-            assert callable(getattr(extension.load(module), name)), name
+    for name, module in extension.functions.items():
+        assert callable(getattr(extension.load(module), name)), name
+    for name, module in extension.services.items():
+        assert hasattr(extension.load(module), name), name
     for module in extension.schemas.values():
         assert extension.load(module).schema()
 
@@ -217,11 +218,11 @@ OPTIONS = {
     "repair": (["check", "designs/quickstart.yaml", "--suggest"],),
     "requirements": (["check", "designs/quickstart.yaml", "--goal", "U6 average 1 um"],),
     "pages": (["run", "designs/quickstart.yaml", "--report", "page.html"],),
-    "judgement": (["fit", "designs/quickstart.yaml", "READINGS", "--components", "axis"],),
+    "judgement": (["run", "designs/quickstart.yaml", "--budget"],),
     "campaign": (["plan", "POOL", "--positions", "6", "--sheet", "sheet.html"],),
     "laboratory": (["fit", "designs/quickstart.yaml", "designs/reports/z-low.dmo"],),
     "sweeps": (["schema", "sweep"],),
-    "maps": (["run", "designs/quickstart.yaml", "--lengths"],),
+    "maps": (["map", "designs/park/machines/npl-like.yaml", "--curves"],),
     "certificates": (
         ["fit", "designs/quickstart.yaml", "READINGS", "--certificate", "values.csv"],
         ["simulate", "designs/quickstart.yaml", "-o", "again.csv", "--certificate", "values.csv"],

@@ -5,8 +5,6 @@ themselves.
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -41,34 +39,18 @@ def printed(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:
             lambda: bp.compare(QUICKSTART, trials=2, points=10),
             ("compare", QUICKSTART, "--trials=2", "--points=10"),
         ),
-        (
-            lambda: bp.lengths(QUICKSTART, "0.3 um", grid=(3, 2, 4), coverage_factor=3),
-            (
-                "run",
-                "--lengths",
-                QUICKSTART,
-                "--target=0.3 um",
-                "--grid=3,2,4",
-                "--coverage-factor=3",
-            ),
-        ),
         (lambda: bp.map(MACHINE, grid=(3, 2, 2)), ("map", MACHINE, "--grid=3,2,2")),
         (
             lambda: bp.map(MACHINE, line={"y": 0.3, "z": 0.2}, points=4),
             ("map", MACHINE, "--line=y = 300 mm, z = 200 mm", "--points=4"),
         ),
         (
-            lambda: bp.spline(
-                TABLE, y="finish_error", points="12-32", start_slope="0", evaluate="1 mm"
-            ),
-            (
-                *("spline", TABLE, "--y=finish_error", "--points=12-32", "--start-slope=0"),
-                "--evaluate=1 mm",
-            ),
+            lambda: bp.spline(TABLE, y="finish_error", points="12-32", start_slope="0"),
+            ("spline", TABLE, "--y=finish_error", "--points=12-32", "--start-slope=0"),
         ),
         (
-            lambda: bp.reproduce("certified", "one-position"),
-            ("reproduce", "certified", "--experiment=one-position"),
+            lambda: bp.reproduce("npl", "6.1.2"),
+            ("reproduce", "npl", "--experiment=6.1.2"),
         ),
         (
             lambda: bp.reach(QUICKSTART, unknowns="repeatability", target="1 um", share=0.9),
@@ -200,24 +182,18 @@ WRONG: list[tuple[Callable[[], object], type[Exception], str]] = [
     ),
     (lambda: bp.compare(QUICKSTART, "full"), ValueError, 'estimator: "full" is unknown'),
     (lambda: bp.compare(QUICKSTART, trials=0), ValueError, "trials=0; give 1 at least"),
-    (lambda: bp.lengths(QUICKSTART, 0.5), TypeError, "target=0.5; give a text with a unit"),
-    (lambda: bp.lengths(QUICKSTART, "1 um", grid=1), ValueError, "grid=1; give 2 at least"),
-    (lambda: bp.lengths(QUICKSTART, "1 um", grid=(3, 3)), ValueError, "the grid has 2 numbers"),
-    (lambda: bp.lengths(QUICKSTART, "1 um", grid=(3, 3, "4")), TypeError, r"grid\[2\]='4'; give"),
-    (lambda: bp.lengths(QUICKSTART, "1 um", probe="dwn"), ValueError, 'did you mean "down"'),
     (lambda: bp.map(3), TypeError, r"machine=3; give a fit, what its to_map\(\) gives, or a path"),
     (lambda: bp.map(MACHINE, grid=(2, 2)), ValueError, "give three numbers of points"),
     (lambda: bp.map(MACHINE, points=3), ValueError, "points need a line"),
     (lambda: bp.map(MACHINE, line="y = 3"), ValueError, "y"),
     (lambda: bp.spline(TABLE, knot="none"), TypeError, '"knot" is unknown; did you mean "knots"'),
-    (lambda: bp.spline(TABLE, order="4"), TypeError, "order='4'; give a whole number"),
     (lambda: bp.spline(TABLE, straight=1), TypeError, "straight=1; give a list"),
     (
         lambda: bp.spline(TABLE, y="finish_error", start_slope="flat"),
         ValueError,
         'start_slope: "flat" is not a slope',
     ),
-    (lambda: bp.reproduce("np"), ValueError, 'document: "np" is unknown; give npl or certified'),
+    (lambda: bp.reproduce("np"), ValueError, 'document: "np" is unknown; give npl'),
     (lambda: bp.reproduce("npl", "6.9"), ValueError, 'no experiment "6.9"'),
     (lambda: bp.reach(QUICKSTART, share=2), ValueError, "share=2; give a ratio above 0"),
     (lambda: bp.reach(QUICKSTART, target=3), TypeError, "target=3; give a text with a unit"),
@@ -226,6 +202,12 @@ WRONG: list[tuple[Callable[[], object], type[Exception], str]] = [
     (lambda: bp.check(QUICKSTART, share=0.9), ValueError, "share applies to the goal lengths"),
     (lambda: bp.plan(QUICKSTART, hours="7 h"), TypeError, "hours='7 h'; give hours above 0"),
     (lambda: bp.plan(QUICKSTART, done=3), TypeError, "done=3; give the path of a CSV file"),
+    (lambda: bp.plan(QUICKSTART, hours=-1.0), ValueError, "hours=-1.0; give hours above 0"),
+    (lambda: bp.plan(QUICKSTART, "u6"), ValueError, '"u6" is unknown; did you mean "U6"'),
+    (lambda: bp.run(QUICKSTART, trials=1), ValueError, "trials=1; give 2 at least"),
+    (lambda: bp.run(QUICKSTART, until=float("nan")), ValueError, "until=nan; give a ratio above 0"),
+    (lambda: bp.reach(QUICKSTART, unknowns="rows"), ValueError, "known: repeatability"),
+    (lambda: bp.budget(QUICKSTART, by=None), ValueError, 'by: "None" is unknown; known: axis'),
     (lambda: bp.sweep(3), TypeError, "path=3; give the path of a file"),
     (lambda: bp.run(QUICKSTART, seed=5), ValueError, "apply to trials or until only"),
     (lambda: bp.run(QUICKSTART, workers=3), ValueError, "apply to trials or until only"),
@@ -274,7 +256,6 @@ def test_every_function_reports_steps_alike(tmp_path: Path) -> None:
         lambda report: bp.reliability(QUICKSTART, report=report),
         lambda report: bp.reach(QUICKSTART, "U6 average 0.2 um", "repeatability", report=report),
         lambda report: bp.compare(QUICKSTART, trials=2, points=5, report=report),
-        lambda report: bp.lengths(QUICKSTART, "1 um", grid=3, report=report),
         lambda report: bp.sweep(small_sweep(tmp_path, 2), tmp_path / "a.sqlite", report=report),
     ):
         told: list[ProgressStep] = []
@@ -291,23 +272,6 @@ def test_tables_are_written_as_well(tmp_path: Path) -> None:
         ending = "csv" if write == found.to_csv else "svg"
         with pytest.raises(FileNotFoundError, match="there is no folder .*none; make it, or name"):
             write(tmp_path / "none" / f"a.{ending}")
-
-
-def test_a_check_has_a_table() -> None:
-    (row,) = bp.check(QUICKSTART).to_frame().to_dict("records")
-    assert row["rank"] == "full rank" and row["as expected"]
-    assert row["U6 average, µm"] == 1e6 * bp.run(QUICKSTART)["U6"].average
-    open_, deficiency = deficient()
-    (row,) = bp.check(open_).to_frame().to_dict("records")
-    assert row["rank deficiency"] == deficiency and not row["as expected"]
-
-
-def test_an_experiment_shows_itself() -> None:
-    given = bp.quickstart().with_({"positions[z low].name": "<b>"})
-    html = given._repr_html_()
-    assert "1000 x 1000 x 1000 mm" in html and "0.2 µm" in html and "plate: 25 balls" in html
-    assert "position &lt;b&gt;" in html and "<b>" not in html
-    assert html.count("<tr>") == html.count("</tr>") == 12
 
 
 def test_residuals_in_space_are_drawn_as_seen() -> None:
@@ -356,32 +320,14 @@ def test_a_choice_from_a_changed_experiment_is_a_file_of_its_own(tmp_path: Path)
     assert found.sheet_page().count("<section") == 7
 
 
-def test_the_face_loads_nothing_until_it_is_used() -> None:
-    heavy = "{'numpy', 'pandas', 'pydantic', 'scipy', 'yaml', 'matplotlib'}"
-    code = f"import sys, ballplate; print(sorted({heavy} & set(sys.modules)))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == "[]\n"
-
-
 def test_a_notebook_shows_the_first_rows_of_a_long_table() -> None:
     found = bp.reliability(QUICKSTART)
     rows, whole, shown = len(found.rows()), found.to_html(), found._repr_html_()
     assert rows > 60
     # One row of headings.
-    assert whole.count("<tr>") == rows + 1 and shown.count("<tr>") == 61
+    assert whole.count("<tr") == rows + 1 and shown.count("<tr") == 61
     assert f"and {rows - 60} more rows" in shown and "more rows" not in whole
 
 
 def test_the_directory_is_the_face() -> None:
     assert set(dir(bp)) == {*bp.__all__, "__version__"}
-
-
-def test_a_store_in_a_missing_folder_is_refused(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    store, sweep = tmp_path / "new" / "a.sqlite", "designs/sweeps/plate-size.yaml"
-    with pytest.raises(bp.StoreError, match="there is no folder .*new; make it"):
-        bp.sweep(sweep, store)
-    assert main(["sweep", sweep, "--store", str(store)]) == 3
-    assert "there is no folder" in capsys.readouterr().err
-    assert not store.parent.exists()

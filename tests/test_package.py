@@ -104,7 +104,12 @@ def test_what_is_imported_is_declared() -> None:
 
     def is_declared(module: str) -> bool:
         name = re.sub("[-_.]+", "-", distributions.get(module, [module])[0]).lower()
-        return module in sys.stdlib_module_names or name in {*declared, "ballplate", "tests"}
+        return module in sys.stdlib_module_names or name in {
+            *declared,
+            "ballplate",
+            "benchmarks",
+            "tests",
+        }
 
     for folder in ("simulator", "analysis", "tests", "docs/_extensions"):
         for path in (TOP / folder).rglob("*.py"):

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import argparse
 import os
+import signal
 import sys
+import threading
 from collections.abc import Sequence
-from contextlib import suppress
-from functools import partial
 from importlib import import_module
 from types import ModuleType
 from typing import TYPE_CHECKING, Any, NoReturn
 
+from ballplate.simulator.computing.signals import ANSWERS
 from ballplate.simulator.inputs.extensions import (
     Command,
     fault_of,
@@ -24,11 +25,10 @@ from ballplate.simulator.inputs.faces import lazily
 from ballplate.simulator.inputs.unusable import UnusableError
 
 from .completion import SHELLS, PrintCompletion
-from .encoding import write_data_in_utf8, write_readably
-from .interruption import Interruption, files_named, interruptions, leave, tell, written
+from .interruption import Interruption
 from .notes import add_telling, told
 from .outputs import UsageError, check_outputs
-from .streams import StandardOutputError, keep_standard_numbers, lasting_streams
+from .streams import StandardOutputError, lasting_streams
 
 USAGE, BAD_FILE, INTERNAL = 2, 3, 70
 
@@ -66,7 +66,7 @@ def commands_of_all() -> tuple[str, ...]:
 
 def _tell_of_extensions() -> None:
     """Say which extensions that are registered are not used."""
-    for complaint in registered().complaints:
+    for complaint in registered()[1]:
         print(f"warning: {complaint}", file=sys.stderr)
 
 
@@ -189,44 +189,39 @@ def _add_other_commands(command: _Parser, name: str) -> None:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and return its exit status; without arguments, that of the process itself."""
-    is_own_process = arguments is None
-    if is_own_process:
-        keep_standard_numbers()
-    with interruptions(is_own_process) as interruption:
-        status = _answering(arguments, interruption)
-        if is_own_process and interruption.came is not None:
-            if sys.stdout is not None:
-                with suppress(OSError):
-                    sys.stdout.flush()
-            leave(status)
-        return status
-
-
-def _answering(arguments: Sequence[str] | None, interruption: Interruption) -> int:
+    interruption = Interruption()
+    before = {}
+    if threading.current_thread() is threading.main_thread():
+        numbers = [getattr(signal, name) for name in ANSWERS if hasattr(signal, name)]
+        # Shells start processes in the background with signals ignored.
+        heard = [number for number in numbers if signal.getsignal(number) is not signal.SIG_IGN]
+        before = {number: signal.signal(number, interruption.handle) for number in heard}
     try:
-        with interruption.raising():
-            return _main(arguments, interruption)
-    except KeyboardInterrupt:
-        pass
-    except Exception:
+        status = _main(arguments, interruption)
+    except (KeyboardInterrupt, Exception) as error:
         # What fails after a signal does so because of it.
-        if interruption.came is None:
+        if not interruption.came and isinstance(error, Exception):
             raise
-    tell(interruption)
-    return interruption.status
+        interruption.tell()
+        status = interruption.status
+    if arguments is None and interruption.came:
+        # The interpreter's own end would wait for running work. Workers end with their parent.
+        os._exit(status)
+    for number, handler in before.items():
+        signal.signal(number, handler)
+    return status
 
 
 def _main(arguments: Sequence[str] | None, interruption: Interruption) -> int:
     with lasting_streams():
-        write_readably(sys.stdout, sys.stderr)
         try:
+            words = sys.argv[1:] if arguments is None else arguments
+            # The grammar of all commands is needed only where none is named.
+            if not words:
+                parser(with_options=False).print_help(sys.stderr)
+                return USAGE
+            words = _with_command(words)
             try:
-                words = sys.argv[1:] if arguments is None else arguments
-                # The grammar of all commands is needed only where none is named.
-                if not words:
-                    parser(with_options=False).print_help(sys.stderr)
-                    return USAGE
-                words = _with_command(words)
                 options = _grammar(words[0]).parse_args(words)
             except UnusableError as error:
                 print(f"ballplate {words[0]}: {error}", file=sys.stderr)
@@ -235,8 +230,6 @@ def _main(arguments: Sequence[str] | None, interruption: Interruption) -> int:
                 # Help is data, too.
                 sys.stdout.flush()
                 raise
-            write_data_in_utf8(options)
-            interruption.kept = partial(written, files_named(options))
             options.interruption = interruption
             status = _run(options)
             if registered.cache_info().currsize:
@@ -258,7 +251,10 @@ def _grammar(word: str) -> _Parser:
 
 def _run(options: argparse.Namespace) -> int:
     # Loaded only now, so that --help and wrong usage answer at once.
+    from concurrent.futures import BrokenExecutor
+
     from ballplate.simulator.computing.internal_error import InternalError
+    from ballplate.simulator.computing.memory import want_of_memory
     from ballplate.simulator.inputs.messages import ExperimentError, in_one_line
 
     try:
@@ -283,15 +279,16 @@ def _run(options: argparse.Namespace) -> int:
     except Exception as error:
         from ballplate.simulator.inputs.extensions import missing
 
-        from .memory import no_memory
-
         if (gone := missing(error)) is not None:
             print(f"ballplate {options.command}: {gone}", file=sys.stderr)
             return BAD_FILE
-
-        shortage = no_memory(error, options)
-        if shortage is not None:
-            print(shortage, file=sys.stderr)
+        if isinstance(error, BrokenExecutor):
+            text = "a worker process was ended from outside, as a rule because memory ran short"
+            print(f"ballplate {options.command}: {text}; use fewer --workers", file=sys.stderr)
+            return BAD_FILE
+        if (want := want_of_memory(error)) is not None:
+            text = f"ballplate {options.command} {want}; make the design smaller, or use fewer"
+            print(f"{text} --workers", file=sys.stderr)
             return BAD_FILE
         if isinstance(error, RuntimeError) and "Symlink loop" in str(error):
             print(f"{in_one_line(str(error))}; name a file", file=sys.stderr)
@@ -360,7 +357,6 @@ class _Parser(argparse.ArgumentParser):
 
     def meant_by(self, unknown: Sequence[str]) -> str:
         """Return a suggestion of the options that the unknown ones are probably meant to be."""
-        from ballplate.simulator.inputs.moved import MOVED
         from ballplate.simulator.inputs.settings import nearest
 
         option_strings = [
@@ -369,9 +365,6 @@ class _Parser(argparse.ArgumentParser):
             for option in action.option_strings
             if option.startswith("--")
         ]
-        for word in unknown:
-            if successor := MOVED.get(f"{self.prog} {word.partition('=')[0]}"):
-                return f"; it is now {successor}"
         meant = [
             nearest(option.partition("=")[0], option_strings)
             for option in unknown
@@ -384,11 +377,8 @@ class _Parser(argparse.ArgumentParser):
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if action.choices is not None and value not in action.choices:
-            from ballplate.simulator.inputs.moved import MOVED
             from ballplate.simulator.inputs.settings import nearest
 
-            if successor := MOVED.get(f"{self.prog} {value}"):
-                self.error(f"{self.prog} {value} is now {successor}")
             meant = nearest(str(value), [str(choice) for choice in action.choices])
             if meant is not None:
                 raise argparse.ArgumentError(
@@ -460,10 +450,8 @@ if TYPE_CHECKING:
         day,
         experiments,
         grid,
-        map_path,
         number,
         page_path,
-        percentage,
         print_json,
         print_lines,
         show,
@@ -473,7 +461,6 @@ if TYPE_CHECKING:
         write_noted,
         write_picture,
     )
-    from .excerpts import print_errors
     from .notes import complain, note, warn
     from .outputs import (
         PARQUET,

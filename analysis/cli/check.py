@@ -5,14 +5,12 @@ from __future__ import annotations
 import os
 import shlex
 from argparse import ArgumentParser, Namespace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ballplate.simulator.inputs.extensions import service
 
 from .common import add_file, add_formats, percentage
-from .interruption import signatures, written
 from .notes import note, note_singular_values, tell_notes, warn
 from .outputs import UsageError
 
@@ -49,8 +47,8 @@ def add_options(parser: ArgumentParser) -> None:
         "--suggest",
         action="store_true",
         help=(
-            "suggest changes that remove all undetermined and weakly determined directions, each"
-            " verified, ranked by U6 with uncertain probe offsets"
+            "suggest changes that remove all undetermined and weakly determined directions and meet"
+            " the target, each verified: first moves, then readings, then certificates"
         ),
     )
     parser.add_argument(
@@ -107,8 +105,6 @@ def run(options: Namespace) -> int:
     paths = matching_files(options.files)
     if options.format == "junit":
         service("junit_report")
-    if options.fix:
-        options.interruption.kept = partial(written, signatures(paths))
     files, statuses = [], [AS_EXPECTED]
     with progress(options) as shown:
         for checked in check_files(paths, options.variant, wanted, shown.show):

@@ -135,8 +135,8 @@ def day(text: str) -> str:
 def map_path(text: str) -> Path:
     """Argument type: a map file to be written, whose name says how."""
     path = Path(text)
-    if path.suffix.lower() not in (".yaml", ".yml", ".npz"):
-        raise ArgumentTypeError(f'the name of a map ends in .yaml or .npz, unlike "{text}"')
+    if path.suffix.lower() not in (".yaml", ".yml"):
+        raise ArgumentTypeError(f'the name of a map ends in .yaml, unlike "{text}"')
     return path
 
 

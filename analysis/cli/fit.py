@@ -5,7 +5,6 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from ..estimators.estimator_choice import (
     DRAWN,
@@ -14,27 +13,17 @@ from ..estimators.estimator_choice import (
     fit_readings,
     takers,
 )
-from ..results.groupings import GROUPINGS
 from .common import (
     add_json,
     add_page,
     add_picture,
-    add_workers,
     day,
     map_path,
-    trial_count,
-    whole,
 )
 from .compare import add_pairs
 from .notes import note_singular_values, warn
 from .outputs import UsageError, Writer, add_force, add_output, write
 from .reading_options import add_readings, observed_readings, warn_of
-
-if TYPE_CHECKING:
-    from ballplate.simulator.computing.steps import ProgressStep
-    from ballplate.simulator.experiment.model import Experiment
-
-    from ..results.fits import Fit
 
 DESCRIPTION = (
     "Estimate all parameters of an experiment from readings: a CSV file with the columns position,"
@@ -52,8 +41,6 @@ def add_options(parser: ArgumentParser) -> None:
         help="report error functions by the coefficients of t, t^2, ... on [0, 1]",
     )
     _add_estimators(parser)
-    _add_components(parser)
-    _add_trials(parser)
     add_picture(
         parser,
         "--plot",
@@ -65,7 +52,7 @@ def add_options(parser: ArgumentParser) -> None:
         "--output",
         metavar="MAP",
         type=map_path,
-        help="write the map of the machine, with its covariance (.yaml, or .npz)",
+        help="write the map of the machine, with its covariance (.yaml)",
     )
     parser.add_argument(
         "--date",
@@ -107,34 +94,6 @@ def _add_estimators(parser: ArgumentParser) -> None:
     )
 
 
-def _add_components(parser: ArgumentParser) -> None:
-    parser.add_argument(
-        "--components",
-        choices=GROUPINGS,
-        metavar="BY",
-        help=(
-            "estimate the variances of groups of observations relative to the stated ones, by axis,"
-            " probe, position, artefact or calibration (variance components, REML)"
-        ),
-    )
-
-
-def _add_trials(parser: ArgumentParser) -> None:
-    parser.add_argument(
-        "--trials",
-        metavar="N",
-        type=trial_count,
-        help=(
-            "also fit N data sets simulated with the fitted parameters, and print the standard"
-            " deviations of the estimates with the standard uncertainties (parametric bootstrap)"
-        ),
-    )
-    parser.add_argument(
-        "--seed", type=whole, help="with --trials: seed of the data sets, instead of the file's"
-    )
-    add_workers(parser)
-
-
 def run(options: Namespace) -> int:
     """Fit one experiment; 1 if there is something to complain of."""
     from ballplate.simulator.experiment.map_files import write_map
@@ -155,10 +114,7 @@ def run(options: Namespace) -> int:
         options.across_probes,
         options.scale,
         not options.no_offsets,
-        options.components,
     )
-    if options.trials and isinstance(result, Fit) and result.converged:
-        result = _with_trials(options, result, experiment)
     contents: dict[Path | None, Writer] = {options.report: result.report}
     if result.converged:
         contents[options.plot] = result.plot
@@ -174,25 +130,6 @@ def run(options: Namespace) -> int:
     return warn_of(result)
 
 
-def _with_trials(options: Namespace, result: Fit, experiment: Experiment) -> Fit:
-    from ballplate.simulator.computing.processes import processors
-    from ballplate.simulator.inputs.messages import refused
-
-    from .progress_bars import progress
-
-    seed = experiment.seed if options.seed is None else options.seed
-    with progress(options) as shown:
-
-        def report(step: ProgressStep) -> None:
-            options.interruption.answer()
-            shown.show(step)
-
-        try:
-            return result.with_trials(options.trials, seed, options.workers or processors(), report)
-        except ValueError as error:
-            raise refused(experiment.source, f"{error}; leave --trials out") from None
-
-
 def _refuse_misused(options: Namespace) -> None:
     """Refuse options that do not go together.
 
@@ -205,8 +142,6 @@ def _refuse_misused(options: Namespace) -> None:
         name, estimators = wrong
         option = {"offsets": "no-offsets"}.get(name, name).replace("_", "-")
         raise UsageError(f"--{option} applies to --estimator {estimators} only; leave it out")
-    if options.trials is None and (options.seed is not None or options.workers is not None):
-        raise UsageError("--seed and --workers apply to --trials only; leave them out")
     if options.output and options.estimator != "full":
         raise UsageError("-o writes the map of the full estimator; leave it out")
     if options.date and not options.output:

@@ -26,7 +26,7 @@ def add_telling(parser: ArgumentParser) -> None:
         "-v",
         "--verbose",
         action="store_true",
-        help="also print versions, the files read, and the time that each step takes",
+        help="also print versions, the files read, and the time taken",
     )
 
 

@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import signal
 import stat
 import sys
 from argparse import Action, ArgumentParser, Namespace
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from functools import partial
 from itertools import combinations
@@ -31,8 +31,7 @@ from ballplate.presentation.files import (
     status_of,
     write_files,
 )
-
-from .interruption import named_paths
+from ballplate.simulator.computing.processes import interruptions_blocked
 
 if TYPE_CHECKING:
     from ballplate.simulator.inputs.messages import Message
@@ -169,9 +168,7 @@ def check_outputs(options: Namespace) -> None:
     _refuse_inputs(outputs, options)
     messages = []
     for output in outputs:
-        # What is tried is taken away.
-        with options.interruption.held():
-            messages += _reasons_against(output, options.force)
+        messages += _reasons_against(output, options.force)
     if messages:
         raise ExperimentError(messages)
 
@@ -231,6 +228,14 @@ def _refuse_inputs(outputs: list[Output], options: Namespace) -> None:
                 )
 
 
+def named_paths(options: Namespace) -> Iterator[tuple[str, Path]]:
+    """Paths among the options of a command, with the options' names."""
+    for name, value in vars(options).items():
+        for item in value if isinstance(value, list) else [value]:
+            if isinstance(item, Path):
+                yield name, item
+
+
 def inputs(options: Namespace, outputs: set[str]) -> Iterator[Path]:
     """Files that the options name and that are not written, and those that these files name."""
     from ballplate.simulator.experiment.named_files import named_by
@@ -263,18 +268,15 @@ def _reasons_against(output: Output, force: bool) -> list[Message]:
                 # on Windows.
                 path.open("r+b").close()
             temporary = beside(real(path))
-            make(temporary)
-            temporary.unlink()
+            with interruptions_blocked(signal.SIGTERM):
+                make(temporary)
+                temporary.unlink()
     except (OSError, ValueError) as error:
         reasons.append(_cannot(error))
     return [Message(str(path), 0, 0, "", reason) for reason in reasons]
 
 
-def write_outputs(
-    writers: Mapping[Path, Writer],
-    force: bool,
-    within: Callable[[], AbstractContextManager[None]] = nullcontext,
-) -> bool:
+def write_outputs(writers: Mapping[Path, Writer], force: bool) -> bool:
     """Write files as `write_files` does; False after saying why not."""
     from ballplate.simulator.inputs.messages import Message
 
@@ -282,7 +284,7 @@ def write_outputs(
         if any(map(is_device, writers)):
             # What was printed before stands before it, where it is standard output.
             sys.stdout.flush()
-        write_files(writers, force, within)
+        write_files(writers, force)
     except UnwrittenError as error:
         path = Path(error.filename)
         unchanged = (
@@ -303,7 +305,7 @@ def write(options: Namespace, contents: Contents) -> bool:
         for path, content in contents.items()
         if path is not None
     }
-    is_written = write_outputs(writers, options.force, options.interruption.held)
+    is_written = write_outputs(writers, options.force)
     options.is_written = is_written and options.is_written
     return bool(options.is_written)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from argparse import Action, ArgumentParser, ArgumentTypeError, Namespace
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +13,6 @@ from .common import (
     add_json,
     add_picture,
     add_workers,
-    argument_type,
     count,
     number,
     page_path,
@@ -27,9 +25,6 @@ from .outputs import Writer, add_force, add_output, write
 
 if TYPE_CHECKING:
     from ..planning.selection import Campaign
-
-ORDER_NAMES = ("change-over", "mirrored", "blocks", "least-drift")
-
 
 DESCRIPTION = (
     "Choose the positions and certificates from the pool of an experiment file that minimise a"
@@ -59,27 +54,6 @@ def add_options(parser: ArgumentParser) -> None:
     )
     budget.add_argument("--positions", metavar="N", type=count, help="largest number of positions")
     budget.add_argument("--readings", metavar="N", type=count, help="largest number of readings")
-    order = parser.add_argument_group("order of the positions")
-    order.add_argument(
-        "--order",
-        choices=ORDER_NAMES,
-        help=(
-            "change-over: the least; mirrored: there and back; blocks: random in blocks, by --seed;"
-            " least-drift: that in which drift of the scales does least. Prints the effect of a"
-            " drift in each; default: change-over"
-        ),
-    )
-    order.add_argument(
-        "--drift",
-        metavar="SIZE",
-        action="append",
-        type=_drift,
-        help=(
-            "drift rate to evaluate, such as 0.5um/h of the reference point or 0.2ppm/h"
-            " of the scales; may be given for both; default: that of the file, or 1 um/h and"
-            " 1 ppm/h"
-        ),
-    )
     again = parser.add_argument_group("a campaign that has begun")
     again.add_argument(
         "--done",
@@ -125,15 +99,12 @@ def add_options(parser: ArgumentParser) -> None:
     add_picture(
         output,
         "--plot",
-        help="draw the choice in the volume, its lower bound and the curve",
+        help="draw the choice in the volume or, with --curve, the criterion against the limit",
     )
     add_force(output)
     add_json(parser)
     parser.add_argument(
-        "--seed",
-        type=whole,
-        default=1,
-        help="seed of the random starts of the search, and of --order blocks; default 1",
+        "--seed", type=whole, default=1, help="seed of the random starts of the search; default 1"
     )
     add_workers(parser)
 
@@ -172,12 +143,6 @@ def _hours(text: str) -> float:
     return value
 
 
-@argument_type
-def _drift(text: str) -> str:
-    service("DriftOrders").ensure_size(text)
-    return text
-
-
 def run(options: Namespace) -> int:
     """Choose, print and write; 1 if the choice leaves something undetermined."""
     from ballplate.simulator.computing.processes import processors
@@ -198,14 +163,7 @@ def run(options: Namespace) -> int:
     if any(value is not None for value in asked):
         seconds = None if options.hours is None else HOUR * options.hours
         budget = Budget(seconds, options.readings, options.positions)
-    request = Request(
-        options.criterion,
-        budget,
-        options.curve,
-        options.seed,
-        options.order,
-        tuple(options.drift or ()),
-    )
+    request = Request(options.criterion, budget, options.curve, options.seed)
     with progress(options) as shown:
         planned = campaign(
             experiment, request, offered, earlier, options.workers or processors(), shown.show
@@ -228,8 +186,7 @@ def _write(campaign: Campaign, options: Namespace) -> None:
     if options.sheet is not None:
         contents[options.sheet] = campaign.sheet_page()
     if options.plot is not None:
-        # Numbered as on the run sheet.
-        contents[options.plot] = replace(campaign, chosen=campaign.sheet.chosen).plot
+        contents[options.plot] = campaign.plot
     if write(options, contents):
         for path in filter(None, (options.output, options.sheet)):
             note(options, f"{path} written")

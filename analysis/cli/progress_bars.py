@@ -1,61 +1,32 @@
-"""Progress of a long step on standard error: a bar on a terminal, occasional plain lines
-otherwise.
-"""
+"""Progress of a long step: a bar on a terminal's standard error."""
 
 from __future__ import annotations
 
 import sys
-import time
 from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ballplate.cli.bar import Bar
     from ballplate.simulator.computing.steps import ProgressStep
 
-# Seconds between two lines where there is no terminal.
-LINE_INTERVAL = 5.0
 
-
-@dataclass
 class ProgressDisplay:
-    """Display of steps in sequence; `what` is counted, and identifies the step."""
+    """Bars of steps in sequence, on a terminal only and not if `is_quiet`."""
 
-    is_quiet: bool = False
-    is_verbose: bool = False
-    what: str = ""
-    done: int = 0
-    wanted: int = 0
-    started: float = 0.0
-    last: float = 0.0
-    bar: Bar | None = None
+    def __init__(self, is_quiet: bool) -> None:
+        self.is_shown = not is_quiet and sys.stderr.isatty()
+        self.bar: Any = None
 
     def show(self, step: ProgressStep) -> None:
-        """Report the progress of a step; the remaining time ignores earlier work."""
-        if step.what != self.what:
-            self.close()
-            self.what, self.started, self.last = step.what, time.monotonic(), time.monotonic()
-        self.done, self.wanted = step.done, step.wanted
-        if self.is_quiet or sys.stderr is None:
+        """Report the progress of a step."""
+        if not self.is_shown:
             return
-        if sys.stderr.isatty():
-            self._draw(step)
-        elif time.monotonic() - self.last >= LINE_INTERVAL:
-            from ballplate.cli.bar import line
-
-            self.last = time.monotonic()
-            print(line(step, self.last - self.started), file=sys.stderr, flush=True)
-
-    def _draw(self, step: ProgressStep) -> None:
-        # Loaded only where it is seen.
-        from ballplate.cli.bar import Bar, width
-
-        if self.bar is None:
-            self.bar = Bar(step)
-        self.bar.total, self.bar.ncols = step.wanted, width()
+        if self.bar is None or self.bar.desc != step.what:
+            self.close()
+            self.bar = _bar(step)
+        self.bar.total = step.wanted
         self.bar.set_postfix_str(step.remark, refresh=False)
         self.bar.update(step.done - self.bar.n)
         if step.done == step.wanted:
@@ -68,19 +39,26 @@ class ProgressDisplay:
             self.bar.clear()
 
     def close(self) -> None:
-        """Remove the bar at the end of the step, and print its duration on request."""
+        """Remove the bar at the end of the step."""
         if self.bar is not None:
             self.bar.close()
-        if self.is_verbose and self.what:
-            elapsed = time.monotonic() - self.started
-            print(f"{self.done} of {self.wanted} {self.what}: {elapsed:.3g} s", file=sys.stderr)
-        self.what, self.bar = "", None
+
+
+def _bar(step: ProgressStep) -> Any:
+    # Loaded only where it is seen, without a thread and a lock that a command would have to end.
+    from threading import RLock
+
+    from tqdm import tqdm
+
+    tqdm.monitor_interval = 0
+    tqdm.set_lock(RLock())
+    return tqdm(desc=step.what, total=step.wanted, initial=step.before, miniters=1, leave=False)
 
 
 @contextmanager
 def progress(options: Namespace) -> Iterator[ProgressDisplay]:
     """Return the display of a command's steps."""
-    shown = ProgressDisplay(options.quiet, options.verbose)
+    shown = ProgressDisplay(options.quiet)
     try:
         yield shown
     finally:

@@ -80,7 +80,7 @@ def refuse_other_files(path: Path) -> None:
 
     :raises UsageError: it is one.
     """
-    if path.suffix.lower() in (".yaml", ".yml", ".npz"):
+    if path.suffix.lower() in (".yaml", ".yml"):
         raise UsageError(
             f"{path} is no table of readings; give a table or a report of a measuring program"
             " (ballplate diff compares maps)"

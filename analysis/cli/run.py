@@ -73,7 +73,6 @@ def run(options: Namespace) -> int:
         raise UsageError("--seed and --workers apply to --trials or --until only; leave them out")
     if options.assumptions:
         service("assumption_effects")
-    written_before = options.interruption.kept
     chosen = experiments(options)
     if options.report and len(chosen) > 1:
         names = ", ".join(str(experiment.name or experiment.label) for experiment in chosen)
@@ -97,7 +96,6 @@ def run(options: Namespace) -> int:
             data["monte_carlo"] = trials_data(trials_done)
             if not options.json:
                 print_lines(["", *trials_lines(trials_done)])
-                options.interruption.kept = written_before
             interrupted = trials_done.outcome is not None and trials_done.outcome.interrupted
         results.append(data)
         if interrupted:
@@ -131,9 +129,6 @@ def _trials(experiment: Experiment, options: Namespace) -> Trials:
 
         def report(step: ProgressStep) -> None:
             options.interruption.answer()
-            options.interruption.kept = lambda: (
-                f"the results of the {step.done} data sets done are lost"
-            )
             shown.show(step)
 
         return trials(

@@ -22,7 +22,6 @@ def add_options(parser: ArgumentParser) -> None:
         default="experiment",
         help="which files",
     )
-    parser.set_defaults(prints_data=True)
 
 
 def run(options: Namespace) -> int:

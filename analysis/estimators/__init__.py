@@ -8,6 +8,6 @@ from ballplate.simulator.inputs.faces import lazily
 
 # Public names of this package: extensions import these alone, and its modules are private.
 if TYPE_CHECKING:
-    from .distances import EstimatorComparison, compare_estimators
+    from .distances import compare_estimators
 
 __getattr__, __dir__ = lazily(__name__, __file__)

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from ballplate.simulator.readings.observed_readings import ObservedReadings
 
     from ..presentation.result import FitResult
-    from ..results.groupings import Grouping
 
 EstimatorName = Literal[
     "full", "distances", "cresto", "kruth", "reversal", "length-equations", "sphere-then-metric"
@@ -36,8 +35,6 @@ TAKE: dict[str, tuple[str, ...]] = {
     "pairs": OF_DISTANCES,
     "across_probes": OF_DISTANCES,
     "monomials": ("full", *OF_DISTANCES),
-    "components": ("full",),
-    "trials": ("full",),
 }
 
 
@@ -63,7 +60,6 @@ def fit_readings(
     across_probes: bool = False,
     scale: Any = None,
     offsets: bool = True,
-    components: Grouping | None = None,
 ) -> FitResult:
     """Return the fit of an experiment's readings by an estimator.
 
@@ -84,7 +80,7 @@ def fit_readings(
     if estimator == "full":
         from ..results.fitting import fit
 
-        return fit(experiment, observed, sigma, monomials, components)
+        return fit(experiment, observed, sigma, monomials)
     from .distances import fit_alternative
 
     return fit_alternative(experiment, observed, estimator, pairs, across_probes, monomials)

@@ -53,10 +53,8 @@ SHIPPED = (
         "repair",
         functions=_from("interface", "repair"),
         services={
-            **_from("suggestions", "suggested"),
+            **_from("repair_search", "suggested"),
             **_from("mending_command", "with_repairs"),
-            **_from("missing_bars", "bar_reasons"),
-            **_from("whole_pool", "pool_gap"),
         },
     ),
     _here(
@@ -83,9 +81,8 @@ SHIPPED = (
         },
         functions=_from("interface", "sheet"),
         services={
-            **_from("campaign_picture", "draw_campaign"),
+            **_from("campaign_picture", "draw_curve"),
             **_from("sheet", "Sheet"),
-            **_from("drift_orders", "DriftOrders"),
             **_from("earlier", "begun"),
         },
     ),
@@ -112,7 +109,7 @@ SHIPPED = (
             ),
             "validate": Command(
                 "validate_command",
-                "leave out positions, plates and directions in turn and predict them",
+                "leave out positions in turn and predict them",
                 "evaluate",
             ),
             "run --budget": Command(
@@ -121,7 +118,6 @@ SHIPPED = (
             ),
         },
         functions=_from("interface", "budget", "compare_models", "validate"),
-        services=_from("bootstrap", "bootstrap") | _from("components", "variance_components"),
     ),
     _here(
         "reliability",
@@ -140,7 +136,7 @@ SHIPPED = (
         commands={
             "certificate": Command(
                 "certificate_command",
-                "write a plate's ball co-ordinates with their covariance: page, CSV, DCC, GTC",
+                "write a plate's ball co-ordinates with their covariance: page, CSV, DCC",
                 "evaluate",
             ),
         },
@@ -173,22 +169,8 @@ SHIPPED = (
                 "curves_command",
                 "parametric errors of a machine file or map along their axes, with uncertainties",
             ),
-            "map --convert": Command(
-                "convert_command",
-                "the map of a fit in another error model, with its covariance",
-            ),
-            "adjust": Command(
-                "adjust_command",
-                "predict a machine's errors after adjustments, and compare with a second campaign",
-                "use",
-            ),
-            "run --lengths": Command(
-                "lengths_command", "uncertainties of lengths throughout the volume against a target"
-            ),
         },
-        functions=_from(
-            "interface", "adjust", "convert", "correct", "curves", "diff", "lengths", "map"
-        ),
+        functions=_from("interface", "correct", "curves", "diff", "map"),
     ),
     _here(
         "splines",
@@ -202,7 +184,7 @@ SHIPPED = (
     ),
     _here(
         "pages",
-        functions=_from("interface", "page", "view"),
+        functions=_from("interface", "page"),
     ),
     _here(
         "sweeps",
@@ -213,12 +195,12 @@ SHIPPED = (
                 "plan",
             ),
             "sweep --report": Command(
-                "report_command", "results of a store as an HTML page, or its tables"
+                "report_command", "results of a store as an HTML page, or a table"
             ),
             "sweep --export": Command("export_command", "results of a store as CSV or Parquet"),
         },
         functions={
-            **_from("interface", "stored", "sweep", "sweep_report"),
+            **_from("interface", "stored", "sweep"),
             **_from("running", "OtherSweepError"),
             **_from("store_file", "StoreError"),
         },
@@ -243,7 +225,7 @@ SHIPPED = (
         commands={
             "reproduce": Command(
                 "reproduce_command",
-                "compute published experiments or certified problems, and compare the figures",
+                "compute published experiments, and compare the figures",
             ),
         },
         functions=_from("interface", "reproduce"),

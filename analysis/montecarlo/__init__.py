@@ -9,7 +9,6 @@ from ballplate.simulator.inputs.faces import lazily
 # Public names of this package: extensions import these alone, and its modules are private.
 if TYPE_CHECKING:
     from .accumulator import Accumulator, QuantityAccumulator
-    from .comparison_tables import with_error
     from .experiments import Trials, block_of_trials, combined, trials
     from .figures import MonteCarloEstimate, MonteCarloOutcome
     from .trial_runs import MOST_TRIALS

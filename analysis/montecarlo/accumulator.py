@@ -24,25 +24,17 @@ COVERAGE = 0.95
 SPREAD, ACTUAL, SYSTEMATIC, KNOWN, ESTIMATED = range(5)
 
 
-@dataclass(frozen=True)
-class Factors:
-    """Coverage factors, normal and Student's, and the critical S^2."""
-
-    known: float
-    estimated: float
-    limit: float
-    freedom: int
-
-
-def factors(freedom: int) -> Factors:
-    """Return factors for 95 % coverage, and S^2's 95 % quantile; NaN without degrees of freedom."""
+def factors(freedom: int) -> tuple[float, float, float]:
+    """Return the normal and Student's factor for 95 % coverage, and S^2's 95 % quantile; the latter
+    two are NaN without degrees of freedom.
+    """
     from scipy.special import chdtri, ndtri, stdtrit
 
     tail = 0.5 * (1.0 + COVERAGE)
     if freedom <= 0:
-        return Factors(float(ndtri(tail)), np.nan, np.nan, freedom)
+        return float(ndtri(tail)), np.nan, np.nan
     limit = float(chdtri(freedom, 1.0 - COVERAGE))
-    return Factors(float(ndtri(tail)), float(stdtrit(freedom, tail)), limit, freedom)
+    return float(ndtri(tail)), float(stdtrit(freedom, tail)), limit
 
 
 @dataclass(frozen=True)
@@ -95,33 +87,30 @@ def accumulate(
     shared: Reference, aims: tuple[MonteCarloQuantity, ...], estimates: Estimates, count: int
 ) -> Accumulator:
     """Return sums over the first `count` replicates of a batch."""
-    limits = factors(shared.degrees_of_freedom)
+    known, estimated, limit = factors(shared.degrees_of_freedom)
     used = estimates.converged & (np.arange(len(estimates.index)) < count)
     failed = estimates.index[:count][~estimates.converged[:count]]
     squares = estimates.sum_of_squares[used]
-    sigma = np.sqrt(np.maximum(squares, 0.0) / max(limits.freedom, 1))
+    sigma = np.sqrt(np.maximum(squares, 0.0) / max(shared.degrees_of_freedom, 1))
     quantities = []
-    # Allocated once, since the largest vectors exceed the cache.
-    work = np.empty((2, len(squares) * max((len(aim.base) for aim in aims), default=0)))
     for aim in aims:
         change = aim.change(estimates.found)
         change = change if used.all() else change[used]
-        error, squared = work[:, : change.size].reshape(2, *change.shape)
         # Sums over the quantity's members are products with vectors of weights: one pass each.
         weight = aim.uncertainty**-2.0
-        of_scatter = np.square(change, out=squared) @ weight
+        of_scatter = change**2 @ weight
         # Excess of the errors' squares over those of their deviations, without subtracting two sums
         # that may be far larger.
         systematic = change @ (2.0 * aim.base * weight) + aim.base**2 @ weight
-        np.add(change, aim.base, out=error)
-        np.square(error, out=squared)
+        error = change + aim.base
+        squared = error**2
         errors, squares_of_errors = error.sum(axis=0), squared.sum(axis=0)
         # Relative to the mean square uncertainty in the same unit: relative to each uncertainty,
         # the few members that have almost none would dominate.
         against_typical = squared @ (1.0 / aim.typical)
         squared *= weight
-        within_known = squared <= limits.known**2
-        within_estimated = squared <= (limits.estimated * sigma[:, None]) ** 2
+        within_known = squared <= known**2
+        within_estimated = squared <= (estimated * sigma[:, None]) ** 2
         numbers = np.stack(
             [
                 of_scatter,
@@ -145,6 +134,6 @@ def accumulate(
         tuple(int(k) for k in failed),
         int(estimates.passes[:count].max(initial=0)),
         np.array([squares.sum(), (squares**2).sum()]),
-        int((squares > limits.limit).sum()),
+        int((squares > limit).sum()),
         tuple(quantities),
     )

@@ -108,7 +108,7 @@ def _misfit_lines(result: Trials, outcome: MonteCarloOutcome) -> list[str]:
         f"S^2 is {with_error(misfit.mean)} with {misfit.degrees_of_freedom} degrees of freedom, and"
         f" beyond its 95 % limit in {with_error(misfit.rejected, 100.0)} % of the data sets"
     ]
-    if result.optimism is None:
+    if result.power is None:
         return lines
     if misfit.noise_free < NO_MISFIT * misfit.degrees_of_freedom:
         return [
@@ -136,10 +136,10 @@ def _misfit_lines(result: Trials, outcome: MonteCarloOutcome) -> list[str]:
         ),
         (
             f"readings without noise leave S^2 = {misfit.noise_free:.4g}; with sigma known, S^2"
-            f" alone shows the lack of fit in {100 * result.optimism.power:.3g} % of experiments"
+            f" alone shows the lack of fit in {100 * result.power:.3g} % of experiments"
         ),
     ]
-    own_model = result.optimism.own_model
+    own_model = result.own_model
     if own_model is not None:
         lines.append(
             f"a second fit with the true machine's own functions added, {own_model.more} parameters"
@@ -172,10 +172,10 @@ def trials_data(result: Trials) -> Data:
             "beyond_limit": _figure(misfit.rejected),
         },
     }
-    if result.optimism is not None:
-        own_model = result.optimism.own_model
+    if result.power is not None:
+        own_model = result.own_model
         data["too_optimistic"] = {
-            "misfit_noticed": result.optimism.power,
+            "misfit_noticed": result.power,
             "own_model": (
                 None
                 if own_model is None

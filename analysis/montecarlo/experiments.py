@@ -44,23 +44,18 @@ class OwnModel:
 
 
 @dataclass(frozen=True)
-class Optimism:
-    """Detection of a lack of fit: by S^2 alone with probability `power`, or by a larger model."""
-
-    power: float
-    own_model: OwnModel | None
-
-
-@dataclass(frozen=True)
 class Trials:
-    """Replicates of an experiment; without an outcome there is a reason, and `optimism` if models
-    differ.
+    """Replicates of an experiment; without an outcome there is a reason.
+
+    If the fitted model differs from the true machine's, S^2 alone shows the lack of fit with
+    probability `power`, and a larger model as `own_model` states.
     """
 
     seed: int
     outcome: MonteCarloOutcome | None
     reason: str = ""
-    optimism: Optimism | None = None
+    power: float | None = None
+    own_model: OwnModel | None = None
 
 
 def true_experiment(experiment: Experiment) -> tuple[Design, Truth]:
@@ -87,8 +82,10 @@ def trials(
     if isinstance(shared, str):
         return Trials(chosen, None, shared)
     result = run_trials(shared, chosen, count, until, workers, report)
-    differs = shared.truth.model != shared.design.model
-    return Trials(chosen, result, optimism=_optimism(experiment, shared) if differs else None)
+    if shared.truth.model == shared.design.model:
+        return Trials(chosen, result)
+    power = power_of_misfit(shared.degrees_of_freedom, shared.sum_of_squares)
+    return Trials(chosen, result, power=power, own_model=_own_model(experiment, shared))
 
 
 def block_of_trials(
@@ -131,11 +128,11 @@ def _shared(experiment: Experiment) -> Reference | str:
     return shared if targets(shared) else "the design determines no quantity that can be compared"
 
 
-def _optimism(experiment: Experiment, shared: Reference) -> Optimism:
+def _own_model(experiment: Experiment, shared: Reference) -> OwnModel | None:
+    """Return the result of a second fit; None if it has no further parameters."""
     misfit = shared.sum_of_squares
-    power = power_of_misfit(shared.degrees_of_freedom, misfit)
     if getattr(experiment.true_machine, "error_model", None) is None:
-        return Optimism(power, None)
+        return None
     design = shared.design
     # Neither model need contain the other: the joint rank gives the parameters that the true one
     # adds.
@@ -143,9 +140,7 @@ def _optimism(experiment: Experiment, shared: Reference) -> Optimism:
     widened = joined.observed(_widened(design, shared.truth))
     determined = design.parameter_count - shared.spectrum.deficiency
     more = widened.parameter_count - linearise(widened).deficiency - determined
-    if more == 0:
-        return Optimism(power, None)
-    return Optimism(power, OwnModel(more, misfit, power_of_misfit(more, misfit)))
+    return OwnModel(more, misfit, power_of_misfit(more, misfit)) if more else None
 
 
 def _widened(design: Design, truth: Truth) -> Priors:

@@ -243,4 +243,4 @@ def power_of_misfit(freedom: int, noise_free: float) -> float:
     """
     from scipy.special import chndtr
 
-    return float(1.0 - chndtr(factors(freedom).limit, freedom, noise_free))
+    return float(1.0 - chndtr(factors(freedom)[2], freedom, noise_free))

@@ -19,9 +19,6 @@ from ballplate.simulator.readings.generate import true_readings
 
 from .expansion import Direct, LocalModel, expand
 
-# Readings of a group: enough for efficient matrix products, few enough for the cache.
-READINGS_AT_ONCE = 512
-
 # Largest error, in standard uncertainties of a reading, of an expanded model.
 FAITHFUL = 1e-8
 # Lower limit of uncertainties as a share of the repeatability: replicates are solved by their
@@ -47,7 +44,7 @@ class Truth:
 class PositionReadings:
     """Readings `rows` of one position, each ball at most once, at the reference.
 
-    `ball` are their m balls, if consecutive a slice, `arm` (d, m) the balls in the machine's axes,
+    `ball` are their m balls, `arm` (d, m) the balls in the machine's axes,
     `residual` (d, m) in metres and `weight` (d, m). `probe` (m,) is None unless probe offsets are
     parameters, and `by_influence` (p, d, m), the derivative of the residuals, is None without
     influence quantities.
@@ -55,7 +52,7 @@ class PositionReadings:
 
     rows: slice
     position: int
-    ball: Integers | slice
+    ball: Integers
     arm: Array
     residual: Array
     weight: Array
@@ -169,17 +166,15 @@ def reference(design: Design, truth: Truth) -> Reference:
             PositionReadings(
                 slice(row, row + len(chosen)),
                 position,
-                _as_slice(rows.ball),
-                np.ascontiguousarray(start.rotations[position] @ start.balls[rows.ball].T),
-                np.ascontiguousarray((blocks.residual * noise)[chosen].T),
-                np.ascontiguousarray(weight[chosen].T),
+                rows.ball,
+                start.rotations[position] @ start.balls[rows.ball].T,
+                (blocks.residual * noise)[chosen].T,
+                weight[chosen].T,
                 local(exact[plates[chosen]], p[plates[chosen]]),
                 rows.probe if observed.probes.free.any() else None,
                 None
                 if blocks.by_influence is None
-                else np.ascontiguousarray(
-                    (blocks.by_influence * noise[:, :, None])[chosen].transpose(2, 1, 0)
-                ),
+                else (blocks.by_influence * noise[:, :, None])[chosen].transpose(2, 1, 0),
             )
         )
         row += len(chosen)
@@ -207,7 +202,7 @@ def reference(design: Design, truth: Truth) -> Reference:
         start,
         solution.factor,
         solution.spectrum,
-        np.ascontiguousarray(noise[order].T),
+        noise[order].T,
         plates[order],
         tuple(groups),
         ends,
@@ -234,9 +229,7 @@ def _observed(design: Design) -> Design:
 
 
 def _groups(design: Design) -> list[Integers]:
-    """Return indices into the plates' readings, in groups of limited size: one position, each ball
-    once.
-    """
+    """Return indices into the plates' readings, in groups of one position, each ball once."""
     readings = design.readings.select(design.plate_readings)
     key = readings.position * len(design.balls.names) + readings.ball
     order = np.argsort(key, kind="stable")
@@ -245,21 +238,8 @@ def _groups(design: Design) -> list[Integers]:
     turn[order] = np.arange(len(key)) - first
     order = np.lexsort((readings.ball, turn, readings.position))
     changes = np.diff(readings.position[order]) | np.diff(turn[order])
-    groups = []
-    for members in np.split(order, np.flatnonzero(changes) + 1):
-        count = -(-len(members) // READINGS_AT_ONCE)
-        groups += (
-            [group for group in np.array_split(members, count) if len(group)]
-            if len(members)
-            else []
-        )
-    return groups
-
-
-def _as_slice(ascending: Integers) -> Integers | slice:
-    """Return consecutive indices as a slice, which makes a view of an array instead of a copy."""
-    first, last = int(ascending[0]), int(ascending[-1])
-    return slice(first, last + 1) if last - first + 1 == len(ascending) else ascending
+    groups = np.split(order, np.flatnonzero(changes) + 1)
+    return [members for members in groups if len(members)]
 
 
 def _local_model(design: Design, a: Array, x: Array, p: Array, is_expanded: bool) -> LocalModel:

@@ -27,7 +27,6 @@ from ballplate.simulator.geometry.motions import cross_matrices, vector_from_rot
 from ballplate.simulator.machines.protocol import Array, Integers
 
 from .complete_fits import complete_fit
-from .expansion import Single
 from .reference import PositionReadings, Reference
 
 # Replicates of a batch: constant, since the size of a matrix product affects its last bits.
@@ -43,9 +42,6 @@ SLOWEST = 0.5
 # Step of a converged replicate as a fraction of its first, which is as long as its errors. Each
 # pass shortens it at least a hundredfold: at most a few millionths of the errors remain.
 SMALLEST_STEP = 1e-4
-
-# Share of active replicates below which they are copied into smaller arrays; copying takes time.
-FEW_LEFT = 0.5
 
 
 @dataclass(frozen=True)
@@ -97,7 +93,7 @@ class Draw:
     of observation `errors` (b, m), and of the readings of the lengths' two ends (b, d, m).
     """
 
-    moved: Single
+    moved: Array
     errors: tuple[Array, ...]
     ends: tuple[Array, Array]
 
@@ -118,11 +114,8 @@ def draw(shared: Reference, seed: int, batch: int) -> Draw:
     """Draw the noise of one batch."""
     generator = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(batch,)))
     design = shared.design
-    # Single precision takes half the time, and suffices for noise.
     shape = (BATCH, *shared.noise.shape)
-    moved = design.noise.draw(generator, shape, shared.position, 2, np.float32)
-    moved *= shared.noise.astype(np.float32)
-
+    moved = shared.noise * design.noise.draw(generator, shape, shared.position, 2)
     errors = tuple(kind.errors(generator, BATCH) for kind in design.observations)
     return Draw(moved, errors, _drawn_ends(shared, generator))
 
@@ -160,14 +153,12 @@ def _refined(shared: Reference, drawn: Draw, index: Integers) -> Estimates:
     passes, converged = np.zeros(count, np.int64), np.zeros(count, bool)
     squares, first, previous = np.full(count, np.nan), np.zeros(count), np.zeros(count)
     is_separate = np.zeros(count, bool)
-    # Replicates in the arrays, and the deviations of all when the arrays were last reduced.
-    chosen, ended = np.arange(count), None
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         for number in range(PASSES):
-            before, by_ball, by_shared = _gradient(shared, drawn, at, is_start=number == 0)
+            before, by_ball, by_shared = _gradient(shared, drawn, at)
             balls, common = _step(shared, by_ball, by_shared)
             # A converged replicate stays unchanged, so that its result does not depend on others.
-            active = ~(converged[chosen] | is_separate[chosen])
+            active = ~(converged | is_separate)
             balls, common = balls * active[:, None, None], common * active[:, None]
             poses = np.where(columns >= 0, common[:, np.maximum(columns, 0)], 0.0)
             turn = poses[:, :, d:]
@@ -181,30 +172,24 @@ def _refined(shared: Reference, drawn: Draw, index: Integers) -> Estimates:
             )
             # S^2 after the step, predicted by the quadratic approximation of the factor.
             after = before + (by_ball * balls).sum(axis=(1, 2)) + (by_shared * common).sum(axis=1)
-            squares[chosen[active]] = after[active]
+            squares[active] = after[active]
             size = np.maximum(
                 np.abs(common / layout.scale).max(axis=1, initial=0.0),
                 np.abs(balls).max(axis=(1, 2), initial=0.0),
             )
-            passes[chosen] += active
+            passes += active
             if number == 0:
                 first = size
             else:
                 # One that is left to a separate estimate makes no step, and has not converged.
-                converged[chosen] |= active & (size <= SMALLEST_STEP * first[chosen])
+                converged |= active & (size <= SMALLEST_STEP * first)
                 # The negation includes NaN.
-                is_separate[chosen] |= ~(converged[chosen] | (size <= SLOWEST * previous[chosen]))
-            previous[chosen] = size
-            is_active = ~(converged[chosen] | is_separate[chosen])
-            if not is_active.any():
+                is_separate |= ~(converged | (size <= SLOWEST * previous))
+            previous = size
+            if (converged | is_separate).all():
                 break
-            if is_active.sum() <= FEW_LEFT * len(chosen):
-                # A few may take many passes: drop the others from the arrays.
-                ended = at if ended is None else ended.with_rows(chosen, at)
-                drawn, at, chosen = drawn.select(is_active), at.select(is_active), chosen[is_active]
     converged &= np.isfinite(squares)
-    estimate = at if ended is None else ended.with_rows(chosen, at)
-    return Estimates(index, estimate, squares, passes, converged)
+    return Estimates(index, at, squares, passes, converged)
 
 
 def _no_deviations(shared: Reference, count: int) -> Deviations:
@@ -250,42 +235,35 @@ def _deviation(shared: Reference, state: State) -> Deviations:
     return Deviations(*(value[None] for value in values))
 
 
-def _gradient(
-    shared: Reference, drawn: Draw, at: Deviations, is_start: bool
-) -> tuple[Array, Array, Array]:
+def _gradient(shared: Reference, drawn: Draw, at: Deviations) -> tuple[Array, Array, Array]:
     """Return S^2 (b,), its half gradient by the balls (b, d, n) and by the shared parameters (b,
     s).
-
-    At the start all deviations are zero, which saves computation.
     """
     layout, d = shared.factor.layout, shared.design.dimension
     squares = np.zeros(len(at.a))
     by_ball = np.zeros_like(at.balls)
     by_pose = np.zeros((len(at.a), *layout.pose_columns.shape))
     by_shared = np.zeros((len(at.a), len(layout)))
-    step = None if is_start else at.a
     less = _turns_less_one(at.rotations)
     for group in shared.groups:
         k = group.position
         moved = drawn.moved[:, :, group.rows]
-        rotation = shared.start.rotations[k]
-        if not is_start:
-            rotation = (less[:, k] + np.eye(d)) @ rotation
-        pull, arm = _pull(shared, group, moved, at, None if is_start else less[:, k])
+        rotation = (less[:, k] + np.eye(d)) @ shared.start.rotations[k]
+        pull, arm = _pull(shared, group, moved, at, less[:, k])
         squares += np.einsum("bim,bim->b", pull, pull)
         pull *= group.weight
         by_pose[:, k, :d] -= pull.sum(axis=2)
         by_pose[:, k, d:] -= _moment(arm, pull)
         by_ball[:, :, group.ball] -= np.swapaxes(rotation, -1, -2) @ pull
         by_shared[:, layout.model] += group.model.gather(
-            moved, step, pull, _offsets(at, group.probe)
+            moved, at.a, pull, _offsets(at, group.probe)
         )
         if group.by_influence is not None:
             by_shared[:, layout.influences] += np.tensordot(
                 pull, group.by_influence, ((1, 2), (1, 2))
             )
         if group.probe is not None:
-            _add_by_offset(by_shared, layout, group.probe, group.model.gather_offsets(step, pull))
+            _add_by_offset(by_shared, layout, group.probe, group.model.gather_offsets(at.a, pull))
     position, parameter = np.nonzero(layout.pose_columns >= 0)
     by_shared[:, layout.pose_columns[position, parameter]] += by_pose[:, position, parameter]
     among = Replicates(
@@ -304,40 +282,31 @@ def _gradient(
         if not isinstance(kind, Lengths):
             kind.add_misfit(rows, errors, among)
         elif shared.ends is not None:
-            _lengths(shared, drawn.ends, errors, at, is_start, squares, by_shared)
+            _lengths(shared, drawn.ends, errors, at, squares, by_shared)
     return squares, by_ball, by_shared
 
 
 def _pull(
     shared: Reference,
     group: PositionReadings,
-    moved: Single,
+    moved: Array,
     at: Deviations,
-    less: Array | None,
+    less: Array,
 ) -> tuple[Array, Array]:
-    """Return weighted residuals (b, d, m) of a group, and its balls about their position's origin,
-    (d, m) or (b, d, m).
+    """Return weighted residuals (b, d, m) of a group, and its balls about their position's origin
+    (b, d, m).
 
-    `less` (b, d, d) are the position's rotations, less the unit matrix; None at the start.
+    `less` (b, d, d) are the position's rotations, less the unit matrix.
     """
-    residual = group.residual + moved
-    arm = group.arm
-    if less is None:
-        residual += group.model.change(moved, None)
-    else:
-        residual += group.model.change(moved, at.a, _offsets(at, group.probe))
-        # From the rotation less unity, to avoid the small difference of two large vectors.
-        rotation = shared.start.rotations[group.position]
-        displaced = (less.reshape(-1, less.shape[2]) @ group.arm).reshape(moved.shape)
-        displaced += (rotation + less @ rotation) @ at.balls[:, :, group.ball]
-        residual -= displaced
-        residual -= at.origins[:, group.position, :, None]
-        if group.by_influence is not None:
-            influences = at.shared[:, shared.factor.layout.influences]
-            residual += np.tensordot(influences, group.by_influence, (1, 0))
-        arm = group.arm + displaced
-    residual *= group.weight
-    return residual, arm
+    residual = group.residual + moved + group.model.change(moved, at.a, _offsets(at, group.probe))
+    # From the rotation less unity, to avoid the small difference of two large vectors.
+    rotation = shared.start.rotations[group.position]
+    displaced = less @ group.arm + (rotation + less @ rotation) @ at.balls[:, :, group.ball]
+    residual -= displaced + at.origins[:, group.position, :, None]
+    if group.by_influence is not None:
+        influences = at.shared[:, shared.factor.layout.influences]
+        residual += np.tensordot(influences, group.by_influence, (1, 0))
+    return residual * group.weight, group.arm + displaced
 
 
 def _turn_less_one(turn: Array) -> Array:
@@ -365,19 +334,10 @@ def _turns_less_one(turns: Array) -> Array:
 
 
 def _moment(arm: Array, pull: Array) -> Array:
-    """Return the sum over m of arm x pull, with arm (d, m) or (b, d, m) and pull (b, d, m): (b, 3),
-    in the plane (b, 1).
-    """
+    """Return the sum over m of arm x pull, both (b, d, m): (b, 3), in the plane (b, 1)."""
     planes = [(0, 1)] if pull.shape[1] == 2 else [(1, 2), (2, 0), (0, 1)]
-    if arm.ndim == 2:
-        products = (pull.reshape(-1, arm.shape[1]) @ arm.T).reshape(len(pull), *arm.shape[:1], -1)
-        return np.stack([products[:, j, i] - products[:, i, j] for i, j in planes], axis=1)
-
-    # Separately for each pair of axes: a matrix product per replicate takes twice as long.
-    def product(i: int, j: int) -> Array:
-        return np.einsum("bm,bm->b", arm[:, i], pull[:, j])
-
-    return np.stack([product(i, j) - product(j, i) for i, j in planes], axis=1)
+    products = np.einsum("bim,bjm->bij", arm, pull)
+    return np.stack([products[:, i, j] - products[:, j, i] for i, j in planes], axis=1)
 
 
 def _bracket(turn: Array, before: Array) -> Array:
@@ -409,12 +369,11 @@ def _lengths(
     ends: tuple[Array, Array],
     errors: Array,
     at: Deviations,
-    is_start: bool,
     squares: Array,
     by_shared: Array,
 ) -> None:
     """Add the contribution of length standards read in the volume, with the readings' noise."""
-    step = None if is_start else at.a
+    step = at.a
     lengths = shared.design.of(Lengths)
     assert shared.ends is not None
     first, second = shared.ends

@@ -31,8 +31,9 @@ from ..uncertainty.quantities import QUANTITIES, functions_of
 # Distances followed through all replicates; more are sampled.
 MOST_PAIRS = 1000
 
-# Changes of distances computed at once, so that they stay in cache.
-ENTRIES_AT_ONCE = 16_384
+# Displacements of points at the reference, their true co-ordinates (n, d), and their change (b, d,
+# n).
+Displaced = tuple[Displacements, Array, Callable[[Deviations], Array]]
 
 # Fraction of the largest uncertainty in a unit below which a value is unchanged but for rounding.
 UNCHANGED = 1e-8
@@ -90,17 +91,6 @@ def targets(shared: Reference) -> tuple[MonteCarloQuantity, ...]:
     )
 
 
-@dataclass(frozen=True)
-class Displaced:
-    """Points at the reference, with their displacements, their true co-ordinates `truly` (n, d),
-    and their change (b, d, n).
-    """
-
-    moved: Displacements
-    truly: Array
-    change: Callable[[Deviations], Array]
-
-
 def _displaced(shared: Reference, at: Linearisation) -> Callable[[Places], Displaced]:
     """Return a function from places to `Displaced`, with a cache of points."""
     cache = {}
@@ -108,14 +98,12 @@ def _displaced(shared: Reference, at: Linearisation) -> Callable[[Places], Displ
     def displaced(places: Places) -> Displaced:
         if isinstance(places, BallPlaces):
             truly = places.at(at.design, shared.truth.state)
-            return Displaced(
-                displacements(at, places), truly, lambda change: change.balls[:, :, places.index]
-            )
+            return displacements(at, places), truly, lambda change: change.balls[:, :, places.index]
         key = places.points.tobytes() + places.probes.tobytes()
         if key not in cache:
             true = replace(at.design, model=shared.truth.model)
             truly = places.at(true, shared.truth.state)
-            cache[key] = Displaced(displacements(at, places), truly, _change(shared, places))
+            cache[key] = displacements(at, places), truly, _change(shared, places)
         return cache[key]
 
     return displaced
@@ -126,15 +114,8 @@ def _change(shared: Reference, places: MeasuredPoints) -> Callable[[Deviations],
     model = shared.local_model(places.points, places.probes)
     n, d = places.points.shape
     are_free = bool((shared.factor.layout.offset_columns[places.probes] >= 0).any())
-    # Co-ordinates and distances of the same points are computed successively: one is cached.
-    last: list[tuple[Deviations, Array]] = []
 
     def change(replicates: Deviations) -> Array:
-        if not (last and last[0][0] is replicates):
-            last[:] = [(replicates, changed(replicates))]
-        return last[0][1]
-
-    def changed(replicates: Deviations) -> Array:
         unmoved = np.zeros((len(replicates.a), d, n))
         offsets = replicates.offsets[:, places.probes].swapaxes(1, 2) if are_free else None
         return model.change(unmoved, replicates.a, offsets)
@@ -206,21 +187,21 @@ def _shared(layout: SharedLayout, deviations: Deviations) -> Array:
 
 
 def _coordinates(symbol: str, displaced: Displaced) -> MonteCarloQuantity:
-    base, moved = (displaced.moved.places - displaced.truly).ravel(), displaced.change
+    points, truly, moved = displaced
+    base = (points.places - truly).ravel()
 
     def change(replicates: Deviations) -> Array:
         return moved(replicates).swapaxes(1, 2).reshape(-1, len(base))
 
     return MonteCarloQuantity(
-        symbol, base, displaced.moved.uncertainties.ravel(), ("m",) * len(base), change
+        symbol, base, points.uncertainties.ravel(), ("m",) * len(base), change
     )
 
 
-def _distances(
-    symbol: str, functions: Distances, displaced_points: Displaced
-) -> MonteCarloQuantity:
+def _distances(symbol: str, functions: Distances, displaced: Displaced) -> MonteCarloQuantity:
     """Return distances between all points, a sample of them, or given pairs."""
-    places, moved = displaced_points.moved.places, displaced_points.change
+    points, truly, moved = displaced
+    places = points.places
     if functions.pairs is None:
         *ends, sampled = sample_of_pairs(len(places), MOST_PAIRS)
     else:
@@ -228,34 +209,16 @@ def _distances(
     first, second = ends
     between = places[first] - places[second]
     length = np.linalg.norm(between, axis=1)
-    true_length = np.linalg.norm(
-        displaced_points.truly[first] - displaced_points.truly[second], axis=1
-    )
-    pairs = pairs_of(displaced_points.moved, np.stack(ends, axis=1))
+    true_length = np.linalg.norm(truly[first] - truly[second], axis=1)
+    pairs = pairs_of(points, np.stack(ends, axis=1))
     uncertainty = np.where(pairs.is_open, np.nan, pairs.uncertainties)
 
-    squared, double = length**2, 2.0 * between
-
     def change(replicates: Deviations) -> Array:
-        displaced = moved(replicates)
+        change = moved(replicates)
+        difference = change[:, :, first] - change[:, :, second]
         # The difference of squared lengths from that of co-ordinates keeps all digits.
-        gained = np.zeros((len(displaced), len(first)))
-
-        rows = max(ENTRIES_AT_ONCE // len(first), 1)
-        work = np.empty((2, rows, len(first)))
-        for start in range(0, len(gained), rows):
-            chunk, changes = gained[start : start + rows], displaced[start : start + rows]
-            difference, buffer = work[:, : len(chunk)]
-            for axis in range(displaced.shape[1]):
-                np.take(changes[:, axis], first, axis=1, out=difference, mode="clip")
-                difference -= np.take(changes[:, axis], second, axis=1, out=buffer, mode="clip")
-                np.add(difference, double[:, axis], out=buffer)
-                buffer *= difference
-                chunk += buffer
-            root = np.sqrt(np.add(squared, chunk, out=buffer), out=buffer)
-            root += length
-            chunk /= root
-        return gained
+        gained = (difference * (difference + 2.0 * between.T)).sum(axis=1)
+        return gained / (np.sqrt(length**2 + gained) + length)
 
     return MonteCarloQuantity(
         symbol, length - true_length, uncertainty, ("m",) * len(first), change, sampled

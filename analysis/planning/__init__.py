@@ -17,23 +17,13 @@ if TYPE_CHECKING:
         check_files,
         checked_design,
     )
-    from .choice import Selection
-    from .constraints import HOUR, Budget, Spent
-    from .criteria import DESCRIPTIONS
-    from .drift_times import in_time, without_drift
-    from .information import Information
-    from .orders import LEAST_CHANGE_OVER, ORDERS, OrderName, ReadingOrder, with_probes
+    from .constraints import HOUR, Budget, Constraints
+    from .criteria import DESCRIPTIONS, criterion
+    from .information import Frames, pool_information
     from .remaining_candidates import Offer, offer
     from .run_sheet_tables import price, sheet_data, sheet_lines, summary, times
-    from .schedule import (
-        RunSheet,
-        Step,
-        ball_words,
-        change_over,
-        first_readings,
-        place_words,
-        run_sheet,
-    )
+    from .schedule import RunSheet, Step, run_sheet, steps_of
+    from .search import Losses, SelectionProblem
     from .selection import Campaign
     from .set_ups import REST, SetUp, base_name, position_of, renamed
     from .short_names import names_of_plan

@@ -10,7 +10,6 @@ tangent. The last bound is made sharper by asking for whole candidates in the li
 
 from __future__ import annotations
 
-from collections.abc import Collection
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -90,23 +89,21 @@ class _Tangent:
 
 
 @single_threaded
-def bound(
-    problem: SelectionProblem, start: Collection[int] | None = None, steps: int = MOST_STEPS
-) -> Bound | None:
+def bound(problem: SelectionProblem) -> Bound | None:
     """Return a lower bound of the criterion over all selections within the limits.
 
     The bound is missing if the criterion has no relaxation, or if no mixture of selections
-    determines its functions. A good selection as `start` saves steps.
+    determines its functions.
     """
     if not problem.criterion.is_bounded:
         return None
-    mixture = _first(problem, start)
+    mixture = _first(problem)
     if mixture is None:
         return None
     limits = problem.limits.linear()
     powers = list(POWERS if problem.criterion.is_sharp else POWERS[-1:])
     best = Bound(0.0, mixture.weights)
-    for _ in range(steps):
+    for _ in range(MOST_STEPS):
         tangent = _tangent(problem, mixture.weights, powers[0])
         if tangent is None:
             break
@@ -146,12 +143,12 @@ class _Mixture:
         return _Mixture(np.concatenate([self.vertices, vertex[None]]), shares)
 
 
-def _first(problem: SelectionProblem, start: Collection[int] | None) -> _Mixture | None:
+def _first(problem: SelectionProblem) -> _Mixture | None:
     """Return a mixture of vertices that determines every function, if the search finds one."""
     n = problem.constraints.count
     limits = problem.limits.linear()
     generator = np.random.default_rng(np.random.SeedSequence(0))
-    selection = fill(problem, problem.constraints.must, Losses(problem)) if start is None else start
+    selection = fill(problem, problem.constraints.must, Losses(problem))
     vertices = [np.isin(np.arange(n), list(selection)).astype(float)]
     for _ in range(MOST_STARTS):
         point = _largest(limits, generator.random(n), n)

@@ -10,7 +10,6 @@ from itertools import combinations
 
 import numpy as np
 from ballplate.planning.bound import Bound, bound
-from ballplate.planning.choice import CurvePoint, DriftInOrders, Gain
 from ballplate.planning.constraints import Budget, Constraints, constraints
 from ballplate.planning.criteria import (
     CriterionName,
@@ -18,11 +17,9 @@ from ballplate.planning.criteria import (
     is_about_balls,
     refuse_many_points,
 )
-from ballplate.planning.drift_times import in_time, without_drift
 from ballplate.planning.information import pool_information
-from ballplate.planning.orders import LEAST_CHANGE_OVER, OrderName
 from ballplate.planning.remaining_candidates import Offer, offer, open_directions
-from ballplate.planning.schedule import Completion, run_sheet
+from ballplate.planning.schedule import run_sheet
 from ballplate.planning.search import (
     GAIN,
     Found,
@@ -34,8 +31,8 @@ from ballplate.planning.search import (
     starts,
     value,
 )
-from ballplate.planning.selection import Campaign
-from ballplate.planning.short_names import short_names
+from ballplate.planning.selection import Campaign, CurvePoint, Gain
+from ballplate.planning.short_names import short_names, stated_names
 from ballplate.results.checked_designs import predict
 from ballplate.simulator.computing.processes import in_processes
 from ballplate.simulator.computing.rounding import comparable
@@ -48,7 +45,7 @@ from ballplate.simulator.computing.steps import (
 )
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.experiment.model import AtMost, Candidate, Experiment, Pool, Position
-from ballplate.simulator.inputs.extensions import optional_service, service
+from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.inputs.messages import ExperimentError, refused
 from ballplate.simulator.inputs.settings import listing
 
@@ -68,18 +65,12 @@ CURVE_POINTS = 8
 
 @dataclass(frozen=True)
 class Request:
-    """Request for a plan.
-
-    `curve` adds smaller and larger limits of time; `order` and the sizes of a `drift` add the
-    effect of drift in each order.
-    """
+    """Request for a plan; `curve` adds smaller and larger limits of time."""
 
     criterion: CriterionName = "U6"
     budget: Budget | None = None
     curve: bool = False
     seed: int = 1
-    order: OrderName | None = None
-    drift: tuple[str, ...] = ()
 
 
 def campaign(
@@ -164,22 +155,16 @@ def _campaign(
 ) -> Campaign:
     candidates, standing = offered.candidates, offered.standing
     whole, completed_by = offered.weighed
-    steady = without_drift(experiment)
-
-    def report_earlier(step: ProgressStep) -> None:
-        report(replace(step, is_last=False))
+    # Drift depends on the order of readings, which follows from the choice.
+    steady = replace(
+        experiment,
+        influences=tuple(some for some in experiment.influences if not some.in_order),
+    )
 
     information = pool_information(
-        steady, whole, is_about_balls(request.criterion), completed_by, report_earlier
+        steady, whole, is_about_balls(request.criterion), completed_by, report
     )
-    gap = None
-    gap_of = optional_service("pool_gap") if information.deficiency else None
-    if gap_of is not None:
-        gap = gap_of(steady, pool.candidates, information)
-    try:
-        wanted = criterion(information, experiment, request.criterion)
-    except ExperimentError as error:
-        raise error if gap is None else gap.refusing(error) from None
+    wanted = criterion(information, experiment, request.criterion)
     drawn_candidates = [
         offered.now(k) for k, candidate in enumerate(pool.candidates) if candidate.drawn
     ]
@@ -201,13 +186,13 @@ def _campaign(
     _refuse_impossible(experiment, limits, candidates)
     problem = SelectionProblem(information, wanted, limits)
 
-    best, relaxed = _search(problem, drawn, request.seed, workers, report_earlier)
+    best, relaxed = _search(problem, drawn, request.seed, workers, report)
     if relaxed is not None:
         relaxed.check(request.criterion, best.value)
     _refuse_lacking(experiment, problem, best, begun)
     completed = None
     if standing is not None and standing.rest in best.chosen:
-        completed = Completion(candidates[standing.rest], standing.whole)
+        completed = candidates[standing.rest], standing.whole
     chosen = offered.together(best.chosen)
     left_open = open_directions(offered, information, best.chosen)
     # What no candidate determines may be expected; what the choice alone leaves open is not.
@@ -220,16 +205,15 @@ def _campaign(
     interrupted = tuple(candidates[given_candidate.part] for given_candidate in offered.interrupted)
     # In the order in which they will be read, as the first of a plate may hold its frame, on which
     # U1 and U2 depend.
-    orders = _orders(experiment, pool, request, offered, chosen)
-    order = LEAST_CHANGE_OVER if orders is None else orders.chosen
-    sheet = run_sheet(chosen, pool.changes, done_indices, completed, interrupted, order=order)
+    sheet = run_sheet(chosen, pool.changes, done_indices, completed, interrupted)
     names = short_names(
         (step.position for step in sheet.steps),
         offered.names,
         [given_candidate.name for given_candidate in candidates],
+        stated_names(experiment),
     )
-    sheet = run_sheet(chosen, pool.changes, done_indices, completed, interrupted, names, order)
-    timed = in_time(experiment, sheet, pool.changes, names)
+    sheet = sheet.with_names(names)
+    planned = with_chosen(experiment, sheet.written)
     return Campaign(
         experiment,
         pool,
@@ -247,40 +231,15 @@ def _campaign(
         + (", with what is kept" if set(reference) - set(drawn) else ""),
         limits.spent(reference) if drawn else None,
         wanted.target,
-        _gains(problem, best, candidates, report_earlier if request.curve else report),
+        _gains(problem, best, candidates, report),
         _left_out(unlimited, best, candidates),
-        predict(replace(timed, expected_rank_deficiency=expected or None)),
+        predict(replace(planned, expected_rank_deficiency=expected or None)),
+        sheet,
         tuple(_curve(problem, best, candidates, workers, report)) if request.curve else (),
         completed,
         interrupted,
         left_open,
-        order=order,
-        orders=orders,
-        names=names,
-        gap=gap,
     )
-
-
-def _orders(
-    experiment: Experiment,
-    pool: Pool,
-    request: Request,
-    offered: Offer,
-    chosen: Sequence[Candidate],
-) -> DriftInOrders | None:
-    """Return the reading order and the effect of drift in each order, if the request or the file
-    states a drift and its effect can be computed.
-    """
-    if request.order or request.drift:
-        orders = service("DriftOrders")
-    elif len(without_drift(experiment).influences) < len(experiment.influences):
-        orders = optional_service("DriftOrders")
-    else:
-        return None
-    if orders is None:
-        return None
-    drift: DriftInOrders = orders.of(experiment, pool, request, bool(offered.done), chosen)
-    return drift
 
 
 def _impossible(experiment: Experiment, path: str, text: str) -> ExperimentError:
@@ -373,7 +332,7 @@ def _out_of_reach(
     time.
     """
     if limits.forbids(members):
-        why = "as limits exclude each; change at_most or never_together"
+        why = "as limits exclude each; change at_most"
         return _impossible(experiment, "pool.limits", f"{text}, {why}{or_else}")
     return _impossible(experiment, "pool", f"{text} with {limits.budget}; allow more{or_else}")
 

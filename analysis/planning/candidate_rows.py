@@ -212,14 +212,11 @@ def _length_rows(drawn: PoolDesign) -> dict[int, CandidateRows]:
     design, layout = drawn.design, drawn.layout
     if not len(design.of(Lengths)):
         return {}
-    by_position = design.once(length_whitening).by_position(
+    length, derivative, by_error = design.once(length_whitening).by_position(
         design.of(Lengths), length_derivative(design, drawn.state)
     )
-    derivative = by_position.rows
-    shared = (
-        np.concatenate([derivative[:, drawn.columns], by_position.by_error], axis=1) * drawn.scale
-    )
-    place = design.readings.position[design.of(Lengths).first[by_position.length]]
+    shared = np.concatenate([derivative[:, drawn.columns], by_error], axis=1) * drawn.scale
+    place = design.readings.position[design.of(Lengths).first[length]]
     rows_by_item = {}
     for k in np.unique(place).tolist():
         chosen, columns = np.flatnonzero(place == k), layout.pose_columns[k]

@@ -7,9 +7,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
-from ballplate.presentation.formatting import Data
 from ballplate.simulator.computing.steps import Report, counted, unreported
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
@@ -20,20 +19,12 @@ from ballplate.simulator.inputs.settings import number_of
 from ballplate.simulator.inputs.trust import OPENED, Trust
 from ballplate.simulator.inputs.yamltree import Mark
 
-from ..rank.verdicts import Verdict
 from ..results.checked_designs import check
+from ..results.extension_results import AskedResult
 from ..results.prediction import Advice, Prediction
 from ..results.qualifications import given_words
 
 WITH_MODULES = "leave --no-modules out if you trust the file"
-
-
-class SuggestedChanges(Protocol):
-    """Suggestions for a design, as lines of text and as plain data."""
-
-    def lines(self, judged: Verdict) -> list[str]: ...
-
-    def data(self) -> Data: ...
 
 
 @dataclass(frozen=True)
@@ -47,7 +38,7 @@ class CheckedDesign:
 
     prediction: Prediction
     place: Mark | None
-    suggestions: SuggestedChanges | None = None
+    suggestions: AskedResult | None = None
     goals: tuple[str, ...] = ()
     missed: tuple[str, ...] = ()
     variant: str | None = None
@@ -178,8 +169,8 @@ def advised(design: CheckedDesign) -> CheckedDesign:
     lines = [*design.goals]
     data = {"goals": list(design.goals), "missed": list(design.missed)}
     if design.suggestions is not None:
-        lines += design.suggestions.lines(prediction.verdict)
-        data |= design.suggestions.data()
+        lines += design.suggestions.lines()
+        data |= design.suggestions.to_dict()
     advice = Advice(design.missed, tuple(lines), data)
     return replace(design, prediction=replace(prediction, advice=advice))
 

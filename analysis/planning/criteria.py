@@ -12,7 +12,6 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain, compress
-from typing import Protocol
 
 import numpy as np
 from ballplate.simulator.computing.decompositions import svd
@@ -77,29 +76,6 @@ MOST_POINTS = 1000
 KEPT = 4_000_000
 
 
-class Functions(Protocol):
-    """Quantities whose uncertainties count, as functions of z, in blocks of constant order."""
-
-    @property
-    def count(self) -> int: ...
-
-    def lengths(self) -> Iterator[Array]:
-        """Lengths (some,) in metres that the functions are uncertainties of."""
-        ...
-
-    def uncertainties(self, root: Array) -> Iterator[Array]:
-        """Standard uncertainties (some,) in metres, where root root' is the covariance of z."""
-        ...
-
-    def squares(
-        self, uncertainties: Iterable[Array], weigh: Callable[[Array], Array]
-    ) -> tuple[Array, Array]:
-        """Return sums over all functions: (m,) of `weigh` of their uncertainties (some,), namely
-        (m, some), and of their squares (z, z) weighted by the first.
-        """
-        ...
-
-
 @dataclass(frozen=True)
 class Criterion:
     """A criterion by its `name`: the mean of `functions`, or their largest if `largest`.
@@ -114,7 +90,7 @@ class Criterion:
 
     name: CriterionName
     about_balls: bool
-    functions: Functions | None
+    functions: Several | None
     scaled: Array
     excluded: int = 0
     target: float | None = None
@@ -181,7 +157,7 @@ class Criterion:
         return smooth, value, half.T @ half / (2 * value)
 
 
-def _mean_tangent(functions: Functions, root: Array) -> tuple[float, float, Array]:
+def _mean_tangent(functions: Several, root: Array) -> tuple[float, float, Array]:
     def weigh(uncertainties: Array) -> Array:
         return np.stack([_halved(np.ones(len(uncertainties)), uncertainties), uncertainties])
 
@@ -190,7 +166,7 @@ def _mean_tangent(functions: Functions, root: Array) -> tuple[float, float, Arra
     return value, value, squares / functions.count
 
 
-def _largest_tangent(functions: Functions, root: Array, power: float) -> tuple[float, float, Array]:
+def _largest_tangent(functions: Several, root: Array, power: float) -> tuple[float, float, Array]:
     uncertainties: Iterable[Array] = functions.uncertainties(root)
     uncertainties = list(uncertainties) if functions.count <= KEPT else uncertainties
     largest = max(float(some.max(initial=0.0)) for some in uncertainties)
@@ -384,7 +360,9 @@ class Pairs:
 
 @dataclass(frozen=True)
 class Several:
-    """Functions of several kinds, one after the other."""
+    """Quantities whose uncertainties count, as functions of z of several kinds, one after the
+    other; each in blocks of constant order.
+    """
 
     parts: tuple[Pairs | Linear, ...]
 
@@ -397,14 +375,19 @@ class Several:
         return sum(part.count for part in self.parts)
 
     def lengths(self) -> Iterator[Array]:
+        """Lengths (some,) in metres that the functions are uncertainties of."""
         return chain.from_iterable(part.lengths() for part in self.parts)
 
     def uncertainties(self, root: Array) -> Iterator[Array]:
+        """Standard uncertainties (some,) in metres, where root root' is the covariance of z."""
         return chain.from_iterable(part.uncertainties(root) for part in self.parts)
 
     def squares(
         self, uncertainties: Iterable[Array], weigh: Callable[[Array], Array]
     ) -> tuple[Array, Array]:
+        """Return sums over all functions: (m,) of `weigh` of their uncertainties (some,), namely
+        (m, some), and of their squares (z, z) weighted by the first.
+        """
         iterator = iter(uncertainties)
         by_part = [part.squares(iterator, weigh) for part in self.parts]
         return np.sum([sums for sums, _ in by_part], axis=0), np.sum(

@@ -99,8 +99,8 @@ class Information:
     the addition of each. `deficiency` counts shared directions (c, deficiency), `open_` in
     micrometres, that all candidates together leave undetermined. `frames` (candidates that
     calibrate co-ordinates) hold the part of its plate's frame that each fixes. `pose_ranks` counts
-    the parameters of its own pose that each candidate determines, all others known, `pose_open`
-    the remaining ones, and `has_rows` is true if it observes anything.
+    the parameters of its own pose that each candidate determines, all others known, and `has_rows`
+    is true if it observes anything.
     """
 
     drawn: PoolDesign
@@ -111,23 +111,11 @@ class Information:
     open_: Array
     frames: Frames
     pose_ranks: tuple[int, ...] = ()
-    pose_open: tuple[int, ...] = ()
     has_rows: tuple[bool, ...] = ()
 
     @property
     def deficiency(self) -> int:
         return int(self.open_.shape[1])
-
-    @property
-    def balls_open(self) -> int:
-        """Number of combinations of balls, other than motions of whole plates, that no candidate
-        observes.
-        """
-        design, open_ = self.drawn.design, self.basis.balls @ self.basis.ball_open
-        motions = _motions(design).reshape(design.balls.places.size, -1)
-        open_ = open_.reshape(len(motions), -1)
-        singular_values = svd(open_ - motions @ (motions.T @ open_), compute_uv=False)
-        return int((singular_values > SAME).sum())
 
     @cached_property
     def shared(self) -> slice:
@@ -251,17 +239,14 @@ def pool_information(
     of_positions = position_rows(drawn)
     pool_rows = []
     pose_ranks = []
-    pose_open = []
     for k in counted(range(len(candidates)), "candidates", len(candidates), report):
         if k in items:
             pool_rows.append(np.concatenate([_in_amounts(r, balls) for r in items[k]]))
             pose_ranks.append(0)
-            pose_open.append(0)
             continue
         rows = next(of_positions)
         pool_rows.append(_reduced(_in_amounts(rows, balls)))
         pose_ranks.append(_range(rows.by_pose).shape[1])
-        pose_open.append(rows.by_pose.shape[1] - pose_ranks[-1])
     if is_even:
         basis, open_ = _basis(balls, drawn.shared, [base, *pool_rows])
     else:
@@ -297,7 +282,6 @@ def pool_information(
         open_,
         frames,
         tuple(pose_ranks),
-        tuple(pose_open),
         has_rows,
     )
 

@@ -9,7 +9,6 @@ from ballplate.simulator.inputs.settings import number_of
 
 from ..presentation.formatting import picked
 from ..presentation.table_columns import table_lines
-from .constraints import SLACK
 from .schedule import RunSheet, Step
 
 
@@ -63,7 +62,6 @@ def sheet_data(sheet: RunSheet) -> Data:
             for calibration in sheet.calibration
         ],
         "seconds": sheet.seconds if sheet.timed else None,
-        "above_least_change_seconds": sheet.gap if sheet.timed else None,
     }
 
 
@@ -83,8 +81,6 @@ def summary(sheet: RunSheet) -> str:
         text += f": {sheet.hours:.2f} h"
         change = sum(step.change_seconds for step in todo)
         text += f", including change-over {change / 3600.0:.2f} h" if change else ""
-        more = f" (at most {sheet.gap / 60.0:.1f} min more than the least of any order)"
-        text += more if sheet.gap > SLACK else ""
     return f"{text}; {number_of(done_count, 'position')} done before" if done_count else text
 
 

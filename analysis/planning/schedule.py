@@ -1,28 +1,20 @@
-"""Schedule of a campaign: the order with the least change-over, and the run sheet."""
+"""Schedule of a campaign: a short order, and the run sheet."""
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Position
 from ballplate.simulator.inputs.settings import listing
 
-from .changeover import cheapest, kind_of
-from .orders import LEAST_CHANGE_OVER, ReadingOrder, Sequenced, in_order
+from .changeover import Setup, kind_of, short_order
+from .set_ups import position_of
 from .short_names import with_short_name
 
-
-@dataclass(frozen=True)
-class Completion:
-    """Missing readings of a position whose artefact is still set up, and the position with all its
-    readings.
-    """
-
-    rest: Candidate
-    whole: Candidate
+# Positions with their probes in order.
+Sequenced = Sequence[tuple[Candidate, tuple[str, ...]]]
 
 
 @dataclass(frozen=True)
@@ -88,15 +80,12 @@ class RunSheet:
     """Positions in reading order, completed ones first, and items of calibration with their price
     in seconds.
 
-    Without durations in the file it is not `timed`, and all times are zero. An order of least
-    change-over takes at most `gap` seconds more than any other.
+    Without durations in the file it is not `timed`, and all times are zero.
     """
 
     steps: tuple[Step, ...]
     calibration: tuple[Candidate, ...]
     timed: bool = True
-    changes: ChangeTimes = ChangeTimes(0.0, 0.0)
-    gap: float = 0.0
 
     @property
     def chosen(self) -> tuple[Candidate, ...]:
@@ -107,17 +96,17 @@ class RunSheet:
         badly.
         """
         steps = sorted(self.steps, key=lambda step: step.left)
-        return (*(step.whole or step.candidate for step in steps), *self.calibration)
+        return (*(step.position for step in steps), *self.calibration)
+
+    def with_names(self, names: Mapping[str, str]) -> RunSheet:
+        """Return the sheet with short names by the names of candidates."""
+        steps = (replace(step, short=names.get(step.position.name, "")) for step in self.steps)
+        return replace(self, steps=tuple(steps))
 
     @property
-    def first_readings(self) -> dict[str, float]:
-        """When the first reading of each position that is to be read begins, in seconds as
-        `Step.start` counts.
-        """
-        todo = [step for step in self.steps if not step.done]
-        sequence = tuple((step.candidate, step.probes) for step in todo)
-        steps = first_readings(sequence, self.changes)
-        return {step.name: start for step, start in zip(todo, steps, strict=True)}
+    def names(self) -> dict[str, str]:
+        """Short names by the names of candidates."""
+        return {step.position.name: step.short for step in self.steps if step.short}
 
     @property
     def written(self) -> tuple[Candidate, ...]:
@@ -144,20 +133,18 @@ def run_sheet(
     chosen: Sequence[Candidate],
     changes: ChangeTimes,
     done: Sequence[Candidate] = (),
-    completed: Completion | None = None,
+    completed: tuple[Candidate, Candidate] | None = None,
     interrupted: Collection[Candidate] = (),
-    names: Mapping[str, str] | None = None,
-    order: ReadingOrder = LEAST_CHANGE_OVER,
 ) -> RunSheet:
-    """Return the run sheet of chosen candidates in the cheapest order or another one, completed
-    ones first in theirs.
+    """Return the run sheet of chosen candidates in a short order, completed ones first in theirs.
 
     `done` candidates may be among the chosen ones; they take no more time, and the first remaining
-    position needs no change, like any first one. A `completed` position is that first one while
-    its artefact is set up; only its missing readings take time. Other `interrupted` positions are
-    unchanged. `names` are short names by those of candidates.
+    position needs no change, like any first one. A `completed` position, by its missing readings
+    and with all of them, is that first one while its artefact is set up; only its missing readings
+    take time. Other `interrupted` positions are unchanged.
     """
-    again = set() if completed is None else {completed.whole.name}
+    rest, whole = completed or (None, None)
+    again = set() if whole is None else {whole.name}
     before = [
         candidate
         for candidate in done
@@ -170,63 +157,30 @@ def run_sheet(
         for candidate in chosen
         if isinstance(candidate.item, Position) and candidate.name not in earlier
     ]
-    first = None if completed is None else completed.rest
-    if order.name == "change-over":
-        sequence, gap = ordered(positions, changes, before, first)
-    else:
-        begun, gap = ordered((), changes, before, first)
-        sequence = (*begun, *in_order(positions, changes, order))
     steps = []
+    for step in steps_of(ordered(positions, changes, before, rest), changes, len(before)):
+        if whole is not None and step.candidate is rest:
+            place = f"as it stands: {step.place}"
+            balls = f"the rest, {step.readings} of {whole.readings} readings: {step.balls}"
+            step = replace(step, place=place, balls=balls, whole=whole)
+        elif step.done and step.candidate.name in interrupted_names:
+            step = replace(step, balls=f"{step.balls}; left so", left=True)
+        steps.append(step)
+    calibration = (item for item in chosen if not isinstance(item.item, Position))
+    return RunSheet(tuple(steps), tuple(calibration))
+
+
+def steps_of(sequence: Sequenced, changes: ChangeTimes, done: int = 0) -> Iterator[Step]:
+    """Yield the steps of positions in a sequence, of which the first ones are `done`."""
     elapsed = 0.0
     for k, (candidate, probes) in enumerate(sequence):
-        is_done = k < len(before)
         change, words = 0.0, ""
-        if k > len(before):
+        if k > done:
             change, words = change_over(sequence[k - 1], sequence[k], changes)
-        seconds = 0.0 if is_done else candidate.seconds
-        place, balls, whole = place_words(candidate), ball_words(candidate), None
-        if completed is not None and candidate is completed.rest:
-            whole = completed.whole
-            place = f"as it stands: {place}"
-            balls = f"the rest, {candidate.readings} of {whole.readings} readings: {balls}"
-        is_left = is_done and candidate.name in interrupted_names
-        balls += "; left so" if is_left else ""
-        steps.append(
-            Step(
-                candidate,
-                place,
-                probes,
-                balls,
-                words,
-                change,
-                seconds,
-                elapsed,
-                is_done,
-                whole,
-                is_left,
-                (names or {}).get((whole or candidate).name, ""),
-            )
-        )
+        seconds = 0.0 if k < done else candidate.seconds
+        place, balls = place_words(candidate), ball_words(candidate)
+        yield Step(candidate, place, probes, balls, words, change, seconds, elapsed, k < done)
         elapsed += change + seconds
-    return RunSheet(
-        tuple(steps),
-        tuple(candidate for candidate in chosen if not isinstance(candidate.item, Position)),
-        changes=changes,
-        gap=gap,
-    )
-
-
-def first_readings(sequence: Sequenced, changes: ChangeTimes) -> list[float]:
-    """When the first reading of each position in a sequence begins, in seconds."""
-    done_visits, elapsed = [], 0.0
-    for k, (candidate, probes) in enumerate(sequence):
-        elapsed += change_over(sequence[k - 1], sequence[k], changes)[0] if k else 0.0
-        elapsed += candidate.seconds
-        seconds_taken = (
-            len(probes) - 1
-        ) * changes.probe + candidate.readings * candidate.reading_seconds
-        done_visits.append(elapsed - min(seconds_taken, candidate.seconds))
-    return done_visits
 
 
 def change_over(
@@ -309,49 +263,37 @@ def ball_words(candidate: Candidate) -> str:
 
 
 def ordered(
-    chosen: Sequence[Candidate],
+    positions: Sequence[Candidate],
     changes: ChangeTimes,
-    done_candidates: Sequence[Candidate] = (),
+    done: Sequence[Candidate] = (),
     first: Candidate | None = None,
-) -> tuple[Sequenced, float]:
-    """Return positions, `done_candidates` ones first, in the cheapest order, each with the order
-    of its probes; and the largest possible saving in seconds of another order.
+) -> Sequenced:
+    """Return positions, `done` ones first, in a short order, each with the order of its probes.
 
-    Positions of one class keep their given order. One of the remaining may be required as `first`.
+    Positions of one class keep their given order. A further one may be required as the `first` of
+    the remaining.
     """
-    positions = [candidate for candidate in chosen if isinstance(candidate.item, Position)]
-    after = first if first is not None else done_candidates[-1] if done_candidates else None
-    order = cheapest(
-        Counter(map(kind_of, positions)).items(),
+    after = first if first is not None else done[-1] if done else None
+    by_kind: dict[Setup, list[Candidate]] = {}
+    for candidate in positions:
+        by_kind.setdefault(kind_of(candidate), []).append(candidate)
+    _, order, before = short_order(
+        [(kind, len(members)) for kind, members in by_kind.items()],
         changes,
         None if after is None else kind_of(after),
         is_paid=first is not None,
     )
-    visits = [
-        (candidate, candidate.item.probes)
-        for candidate in done_candidates
-        if isinstance(candidate.item, Position)
-    ]
+    visits = [(candidate, position_of(candidate).probes) for candidate in done]
     if first is not None:
-        visits.append((first, _ending_with(first, order.before)))
-    members = {
-        kind: iter([candidate for candidate in positions if kind_of(candidate) == kind])
-        for kind in set(map(kind_of, positions))
-    }
-    for visit in order.visits:
-        candidate = next(members[visit.kind])
-        visits.append((candidate, _sequence(candidate, visit.first, visit.last)))
-    return tuple(visits), order.seconds - order.bound
+        visits.append((first, _probes(first, None, before)))
+    remaining = {kind: iter(members) for kind, members in by_kind.items()}
+    for visit in order:
+        candidate = next(remaining[visit.kind])
+        visits.append((candidate, _probes(candidate, visit.first, visit.last)))
+    return tuple(visits)
 
 
-def _ending_with(candidate: Candidate, last: str | None) -> tuple[str, ...]:
-    """The probes of a position, the last one last."""
-    assert isinstance(candidate.item, Position)
-    probes = candidate.item.probes
-    return probes if last is None else (*(probe for probe in probes if probe != last), last)
-
-
-def _sequence(candidate: Candidate, first: str, last: str) -> tuple[str, ...]:
-    assert isinstance(candidate.item, Position)
-    between = [probe for probe in candidate.item.probes if probe not in (first, last)]
-    return (first,) if first == last and not between else (first, *between, last)
+def _probes(candidate: Candidate, first: str | None, last: str | None) -> tuple[str, ...]:
+    """The probes of a position, `first` and `last` at the ends."""
+    probes = position_of(candidate).probes
+    return tuple(sorted(probes, key=lambda probe: (probe == last) - (probe == first)))

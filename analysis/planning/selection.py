@@ -1,30 +1,30 @@
-"""A selection of positions and certificates as text."""
+"""A selection of positions and certificates, with the effect of each candidate."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ballplate.presentation.formatting import Data
-from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.experiment.model import Candidate, Experiment, Pool
+from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.inputs.extensions import service
 from ballplate.simulator.inputs.settings import number_of
 
 from ..presentation.formatting import aligned, number, picked
 from ..presentation.result import Result
+from ..results.prediction import Prediction
 from ..results.qualifications import Qualification, given_words, of_pool, qualification_data
 from ..results.text_blocks import target_lines
-from .choice import Gain, Selection
-from .constraints import HOUR, Spent
-from .criteria import DESCRIPTIONS, MAXIMUM
-from .drift_times import in_order_settings, in_time
+from .constraints import HOUR, Budget, Spent
+from .criteria import DESCRIPTIONS, MAXIMUM, CriterionName
 from .experiment_file import experiment_text
 from .run_sheet_tables import sheet_data, sheet_lines
-from .schedule import RunSheet, run_sheet
-from .set_ups import base_name
+from .schedule import RunSheet
+from .set_ups import REST, base_name
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -32,13 +32,70 @@ if TYPE_CHECKING:
 # Candidates left out, and reasons for leaving candidates out of the pool, that are told.
 TOLD = 5
 
-# What is said where nothing drifts: the size of a drift that would be told of, and no orders.
-WITHOUT_DRIFT: Mapping[str, Any] = {"drift": {"point": 1e-6, "scale": 1e-6}, "orders": []}
+
+@dataclass(frozen=True)
+class Gain:
+    """Effect of a candidate: the criterion `without` it and `with_` it, infinite if deficient."""
+
+    candidate: Candidate
+    without: float
+    with_: float
+
+    @property
+    def relative(self) -> float:
+        """Relative increase of the criterion without the candidate."""
+        return self.without / self.with_ - 1.0
+
+
+@dataclass(frozen=True)
+class CurvePoint:
+    """The best selection found for a limit of time; `bound` may be NaN (missing)."""
+
+    budget: Budget
+    spent: Spent
+    chosen: tuple[Candidate, ...]
+    value: float
+    bound: float
 
 
 @dataclass(frozen=True, repr=False)
-class Campaign(Selection, Result):
-    """A selection with its tables, pictures and run sheet."""
+class Campaign(Result):
+    """A selection with its evaluation; values in metres, those of `condition` ratios.
+
+    `chosen` follows the order of the pool, `done` (read already, in part or in full) the order of
+    reading. `completed` has all its readings, past and future. `interrupted` positions were read
+    in part; `left_open` counts the directions of their own poses and lengths that remain
+    undetermined, on which no other parameter depends. `ignored` readings are excluded. `value` is
+    infinite if the selection is deficient; `bound` is the lower bound of all selections, NaN if
+    missing. `drawn` is the criterion of the experiment's own positions, or of an earlier choice,
+    within the limits or not, described by `drawn_words`. `prediction` evaluates the full choice in
+    the order of the `sheet`.
+    """
+
+    experiment: Experiment
+    pool: Pool
+    criterion: CriterionName
+    unit: str
+    excluded: int
+    budget: Budget
+    chosen: tuple[Candidate, ...]
+    done: tuple[Candidate, ...]
+    spent: Spent
+    value: float
+    bound: float
+    drawn: float | None
+    drawn_words: str
+    drawn_spent: Spent | None
+    target: float | None
+    gains: tuple[Gain, ...]
+    left_out: tuple[Gain, ...]
+    prediction: Prediction
+    sheet: RunSheet
+    curve: tuple[CurvePoint, ...] = ()
+    completed: tuple[Candidate, Candidate] | None = None
+    interrupted: tuple[Candidate, ...] = ()
+    left_open: int = 0
+    ignored: tuple[Candidate, ...] = ()
 
     @property
     def label(self) -> str:
@@ -49,24 +106,11 @@ class Campaign(Selection, Result):
         return self.prediction.title
 
     @property
-    def sheet(self) -> RunSheet:
-        """The choice in the order in which it is to be read."""
-        return run_sheet(
-            self.chosen,
-            self.pool.changes,
-            self.done,
-            self.completed,
-            self.interrupted,
-            self.names,
-            self.order,
-        )
-
-    @property
     def chosen_experiment(self) -> Experiment:
         """The experiment with the chosen positions and certificates alone, in the order of the run
         sheet and under its short names.
         """
-        return in_time(self.experiment, self.sheet, self.pool.changes, self.names)
+        return with_chosen(self.experiment, self.sheet.written)
 
     def to_yaml(self, folder: str | Path = ".") -> str:
         """Return the choice as the text of an experiment file for a folder.
@@ -82,17 +126,8 @@ class Campaign(Selection, Result):
         )
         if expected_deficiency == self.prediction.verdict.deficiency:
             deficiency = expected_deficiency
-        written = self.sheet.written
         return experiment_text(
-            self.experiment,
-            written,
-            header,
-            Path(folder),
-            None,
-            deficiency,
-            self.names,
-            in_order_settings(self.chosen_experiment),
-            with_times=True,
+            self.experiment, self.sheet.written, header, Path(folder), deficiency
         )
 
     def sheet_page(self) -> str:
@@ -103,6 +138,29 @@ class Campaign(Selection, Result):
     def to_print(self) -> Any:
         """Return the run sheet with the table to fill in and the points."""
         return service("Sheet")(self.experiment, self.sheet)
+
+    def title_of(self, candidate: Candidate) -> str:
+        """The name of a candidate, after its short name if it has one."""
+        prefix, name = "", candidate.name
+        if name.startswith(REST):
+            prefix, name = REST, name.removeprefix(REST)
+        short = self.sheet.names.get(name, name)
+        return candidate.name if short == name else f"{prefix}{short}, {name}"
+
+    @property
+    def efficiency(self) -> float:
+        """Bound over value: the selection is at most this far from the best possible."""
+        return self.bound / self.value
+
+    @property
+    def drawn_is_within(self) -> bool:
+        """True if the reference selection is within the limit; then the choice is never worse."""
+        spent, budget = self.drawn_spent, self.budget
+        return spent is None or spent.is_within(budget)
+
+    @property
+    def is_determined(self) -> bool:
+        return math.isfinite(self.value)
 
     def headline(self) -> str:
         count = f"{len(self.chosen)} of {len(self.pool.candidates)} candidates"
@@ -146,15 +204,13 @@ class Campaign(Selection, Result):
                 f"left out of {self.criterion}: {self.excluded} that no choice from this pool"
                 " determines"
             )
-        if self.gap is not None:
-            lines += [self.gap.words, self.gap.remedy]
+        if any(influence.in_order for influence in self.experiment.influences):
+            lines.append("positions were chosen without drift; U1 to U6 are those with the drift")
         lines += _interrupted(self)
         if self.gains:
             lines += ["", *_gain_table(self)]
         if self.curve:
             lines += ["", *_curve_table(self)]
-        orders = [] if self.orders is None else self.orders.lines(self)
-        lines += ["", *orders] if orders else []
         return [*lines, "", *self.prediction.lines()[1:], "", *sheet_lines(self.sheet)]
 
     def data(self) -> Data:
@@ -166,12 +222,11 @@ class Campaign(Selection, Result):
             **picked(self, "criterion", "unit", "budget", "value", "bound", "drawn"),
             **picked(self, "drawn_spent", "target", "excluded", "spent"),
             "chosen": _names(self.chosen),
-            "names": dict(self.names),
+            "names": self.sheet.names,
             "done": _names(self.done),
             "interrupted": [picked(position, "name", "readings") for position in self.interrupted],
-            "completed": self.completed and self.completed.whole.name,
+            "completed": self.completed and self.completed[1].name,
             "left_open": self.left_open,
-            "whole_pool": self.gap and self.gap.to_dict(),
             "ignored": _names(self.ignored),
             "gains": list(map(_gain_data, self.gains)),
             "left_out": list(map(_gain_data, self.left_out)),
@@ -183,8 +238,6 @@ class Campaign(Selection, Result):
                 }
                 for point in self.curve
             ],
-            **picked(self, "order"),
-            **(WITHOUT_DRIFT if self.orders is None else self.orders.data()),
             "run_sheet": sheet_data(self.sheet),
             "qualifications": qualification_data(self.qualifications),
             "plan": self.prediction.to_dict(),
@@ -195,15 +248,16 @@ class Campaign(Selection, Result):
         return list(sheet_data(self.sheet)["steps"])
 
     def plot(self, path: str | Path | None = None) -> Figure:
-        """Draw the criterion against the limit of time, the effect of each position, and the
-        positions in the volume.
+        """Draw the criterion against the limit, or without a curve the positions in the volume.
 
         With a path, which ends in .svg, .png or .pdf, the picture is written as well.
 
         :raises ImportError: matplotlib is missing.
         :raises ValueError: the path has another suffix.
         """
-        figure: Figure = service("draw_campaign")(self, path)
+        if not self.curve:
+            return self.prediction.plot(path)
+        figure: Figure = service("draw_curve")(self, path)
         return figure
 
 
@@ -214,8 +268,8 @@ def _interrupted(campaign: Campaign) -> list[str]:
     for position in campaign.interrupted:
         count = number_of(position.readings, "reading")
         text = f"{campaign.title_of(position)} was interrupted after {count}"
-        if campaign.completed is not None and campaign.completed.whole.name == position.name:
-            text += f"; {campaign.completed.rest.readings} more complete it"
+        if campaign.completed is not None and campaign.completed[1].name == position.name:
+            text += f"; {campaign.completed[0].readings} more complete it"
         elif again := [
             name
             for name in names

@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
-from typing import Any
 
 from ballplate.simulator.experiment.model import Candidate, Experiment, Position
 
-from .set_ups import base_name
+from .set_ups import base_name, position_of
 
 # A column whose name begins so has the rest of it in all rows.
 OF_ALL = "="
 
 
 def short_names(
-    order: Iterable[Candidate], names_known: Mapping[str, str], names_taken: Collection[str]
+    order: Iterable[Candidate],
+    names_known: Mapping[str, str],
+    names_taken: Collection[str],
+    names_kept: Collection[str] = (),
 ) -> dict[str, str]:
     """Return short names by the names of candidates, P1, P2 … in the order of measuring.
 
-    Positions named in the file keep their names, and those `names_known` from an earlier plan keep
-    these. No name is `names_taken`, or differs from another in capitals alone; numbers in use are
-    skipped, so that each number means one position.
+    Positions named in the file, and `names_kept`, keep their names, and those `names_known` from an
+    earlier plan keep these. No name is `names_taken`, or differs from another in capitals alone;
+    numbers in use are skipped, so that each number means one position.
     """
     used = {name.casefold() for name in (*names_taken, *names_known.values())}
     names_found = {}
@@ -29,7 +31,7 @@ def short_names(
     for place, candidate in enumerate(order, 1):
         if candidate.name in names_known:
             names_found[candidate.name] = names_known[candidate.name]
-        elif is_composed(candidate):
+        elif is_composed(candidate) and candidate.name not in names_kept:
             number = max(number + 1, place)
             while f"p{number}" in used:
                 number += 1
@@ -53,8 +55,7 @@ def with_short_name(candidate: Candidate, name: str, probes: tuple[str, ...]) ->
 
     Probes of several groups of readings stay in the order of the groups.
     """
-    item = candidate.item
-    assert isinstance(item, Position)
+    item = position_of(candidate)
     settings = dict(candidate.settings)
     description = item.description
     if name != candidate.name:
@@ -70,38 +71,20 @@ def with_short_name(candidate: Candidate, name: str, probes: tuple[str, ...]) ->
     return replace(candidate, name=name, item=item, settings=settings)
 
 
-def with_names(experiment: Experiment, names: Mapping[str, str]) -> Experiment:
-    """Return the experiment with its statements on single positions under short names."""
-    influences = tuple(
-        influence.model_copy(update={"positions": renamed(old_positions, names)})
-        if (old_positions := getattr(influence, "positions", None)) is not None
-        else influence
-        for influence in experiment.influences
-    )
-    readings = experiment.readings
-    if readings.columns is not None:
-        old_positions = renamed_of_all(readings.columns.position, names)
-        columns = readings.columns.model_copy(update={"position": old_positions})
-        readings = readings.model_copy(update={"columns": columns})
-    return replace(experiment, influences=influences, readings=readings)
-
-
-def renamed_of_all(column: str | None, names: Mapping[str, str]) -> str | None:
-    """Return a table's column of positions, or the position of all rows stated as =NAME, by short
-    name.
+def stated_names(experiment: Experiment) -> set[str]:
+    """Names of positions that influence quantities or the columns of readings state, which a plan
+    keeps.
     """
-    if column is None or not column.startswith(OF_ALL):
-        return column
-    name = column.removeprefix(OF_ALL)
-    return OF_ALL + names.get(name, name)
-
-
-def renamed(settings: Mapping[str, Any] | Sequence[str], names: Mapping[str, str]) -> Any:
-    """Return settings by position, or a list of positions, by short names."""
-    if isinstance(settings, Mapping):
-        return {names.get(name, name): value for name, value in settings.items()}
-    new_names = [names.get(name, name) for name in settings]
-    return tuple(new_names) if isinstance(settings, tuple) else new_names
+    stated = {
+        name
+        for influence in experiment.influences
+        for name in getattr(influence, "positions", None) or ()
+    }
+    columns = experiment.readings.columns
+    column = None if columns is None else columns.position
+    if column is not None and column.startswith(OF_ALL):
+        stated.add(column.removeprefix(OF_ALL))
+    return stated
 
 
 def names_of_plan(chosen: Experiment, candidates: Collection[str]) -> dict[str, str]:

@@ -9,7 +9,6 @@ from ballplate.simulator.inputs.faces import lazily
 # Public names of this package: extensions import these alone, and its modules are private.
 if TYPE_CHECKING:
     from .files import write_file, write_files
-    from .formats import FORMATS
     from .formatting import (
         SHOWN,
         Data,
@@ -19,9 +18,7 @@ if TYPE_CHECKING:
         ascii_units,
         chance_words,
         finite,
-        fixed,
         given,
-        micro,
         number,
         percent,
         picked,
@@ -30,15 +27,11 @@ if TYPE_CHECKING:
         to_uncertainty,
         uncertainty_words,
     )
-    from .paper import escaped, on_paper, pitch
-    from .pictures import draw_box, draw_scene
+    from .paper import escaped, on_paper
+    from .pictures import draw_box
     from .result import FitResult, Result
     from .scenes import (
         MOST_BALLS,
-        RISE,
-        TURN,
-        Box,
-        DrawnPosition,
         box,
         box_edges,
         hull,
@@ -63,8 +56,7 @@ if TYPE_CHECKING:
         scale_bar,
         sticks,
     )
-    from .table import Block, Entry, Row, Table
-    from .table_columns import ROUNDING, MainTable, by_axis, table_csv, table_lines
+    from .table_columns import ROUNDING, MainTable, by_axis, table_csv, table_lines, table_rows
     from .vectors import Vectors, draw_vectors
 
 __getattr__, __dir__ = lazily(__name__, __file__)

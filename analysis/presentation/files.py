@@ -5,12 +5,15 @@ from __future__ import annotations
 import errno
 import os
 import shutil
+import signal
 import stat
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext, suppress
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from functools import partial
 from pathlib import Path
+
+from ballplate.simulator.computing.processes import interruptions_blocked
 
 Writer = Callable[[Path], object]
 """A function that writes the file of a path, in the format of the name's suffix."""
@@ -42,17 +45,13 @@ def write_file(path: str | Path, content: bytes) -> None:
     write_files({path: lambda place: place.write_bytes(content)}, force=True)
 
 
-def write_files(
-    writers: Mapping[Path, Writer],
-    force: bool,
-    held: Callable[[], AbstractContextManager[None]] = nullcontext,
-) -> None:
+def write_files(writers: Mapping[Path, Writer], force: bool) -> None:
     """Let each writer write its file: all of them or, if the system permits, none.
 
     Each is written to a temporary name in the same folder, with the permissions of the existing
     file, and renamed when all are on the disk. Links stay: their targets are replaced. Devices and
     pipes are written directly. Without `force` no existing file is replaced, even one created
-    meanwhile. `held` blocks signals while files are renamed or removed.
+    meanwhile. Signals wait while files are renamed or removed.
 
     :raises UnwrittenError: one cannot be written, or a library that it needs is not installed.
     """
@@ -68,14 +67,17 @@ def write_files(
         for path, writer in writers.items():
             if is_device(path):
                 _write_device(path, writer)
-        with held(), _exchange(force, len(temporaries) > 1) as replace:
+        with (
+            interruptions_blocked(signal.SIGTERM),
+            _exchange(force, len(temporaries) > 1) as replace,
+        ):
             for path, temporary in temporaries.items():
                 replace(temporary, real(path))
     except (OSError, UnicodeEncodeError, ImportError) as error:
         why = getattr(error, "strerror", None) or str(error)
         raise UnwrittenError(getattr(error, "errno", None), why, str(path)) from error
     finally:
-        with held():
+        with interruptions_blocked(signal.SIGTERM):
             _remove(temporaries.values())
 
 

@@ -1,71 +1,30 @@
-"""Tables as text, Markdown, HTML, CSV and LaTeX."""
+"""Tables as Markdown, HTML and LaTeX."""
 
 from __future__ import annotations
 
-import io
 import re
-import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from html import escape
+from typing import TYPE_CHECKING
 
-from ballplate.simulator.inputs.spreadsheets import CsvWriter
-
-from .formatting import aligned, ascii_units
-from .table import Block, Row, Table
-
-WIDTH = 120
+if TYPE_CHECKING:
+    import pandas
 
 
-def as_text(title: str, tables: Sequence[Table]) -> str:
-    """Return tables as aligned text."""
-    parts = [title]
-    for table in tables:
-        parts += ["", f"{table.caption}", *_text_rows(table)]
-        for note in table.notes:
-            parts += textwrap.wrap(note, WIDTH)
-    return "\n".join(parts) + "\n"
+def as_markdown(
+    title: str, caption: str, frame: pandas.DataFrame, stubs: int, notes: Sequence[str]
+) -> str:
+    """Return a table of texts, whose first columns `stubs` head its rows, in the Markdown of GitHub
+    and Pandoc.
 
-
-def _text_rows(table: Table) -> list[str]:
-    stubs, count = len(table.headings), len(table.columns)
-    right = [False] * stubs + [True] * count
-    indent = "  " if table.block else ""
-    head = [*table.headings, *table.columns]
-    head[0] = head[0] or table.spanner
-    rows, titles = [head], {}
-    for block in table.blocks:
-        if block.title:
-            titles[len(rows)] = block.title
-        rows += [
-            [indent + row.headings[0], *row.headings[1:], *(e.text for e in row.entries)]
-            for row in block.rows
-        ]
-    lines = []
-    for k, line in enumerate(aligned(rows, right)):
-        lines += [titles[k]] if k in titles else []
-        lines.append(line)
-    return lines
-
-
-def as_markdown(title: str, tables: Sequence[Table]) -> str:
-    """Return tables in the Markdown of GitHub and Pandoc."""
-    parts = [f"# {_markdown(title)}"]
-    for table in tables:
-        parts += ["", f"## {_markdown(table.caption)}"]
-        for block in table.blocks:
-            if block.title:
-                parts += ["", f"### {_markdown(block.title)}"]
-            head = [*table.headings, *table.spanned]
-            marks = [" --- "] * len(table.headings) + [" ---: "] * len(table.columns)
-            parts += ["", _markdown_row(head), f"|{'|'.join(marks)}|"]
-            parts += [_markdown_row(_texts(row)) for row in block.rows]
-        for note in table.notes:
-            parts += ["", _markdown(note)]
-    return "\n".join(parts) + "\n"
-
-
-def _markdown_row(texts: Sequence[str]) -> str:
-    return "|" + "|".join(f" {_markdown(text)} " for text in texts) + "|"
+    :raises ImportError: tabulate is missing.
+    """
+    parts = [f"# {_markdown(title)}", f"## {_markdown(caption)}"]
+    if not frame.empty:
+        texts = frame.map(_markdown).rename(columns=_markdown)
+        sides = ["left"] * stubs + ["right"] * (len(frame.columns) - stubs)
+        parts.append(texts.to_markdown(index=False, disable_numparse=True, colalign=sides))
+    return "\n\n".join([*parts, *map(_markdown, notes)]) + "\n"
 
 
 def _markdown(text: str) -> str:
@@ -77,130 +36,28 @@ def _markdown(text: str) -> str:
     return re.sub(r"([\\`*_{}\[\]<>|#$~])", r"\\\1", text)
 
 
-def as_html(title: str, tables: Sequence[Table]) -> str:
-    """Return tables as HTML elements, below a title."""
-    parts = [f"<p><strong>{escape(title)}</strong></p>"] if title else []
-    for table in tables:
-        head = [*table.headings, *table.spanned]
-        stubs = len(table.headings)
-        parts.append(f"<table><caption>{escape(table.caption)}</caption>")
-        parts.append(f"<thead>{_html_row(head, 'th', stubs)}</thead>")
-        for block in table.blocks:
-            titled = (
-                f'<tr><th colspan="{len(head)}">{escape(block.title)}</th></tr>'
-                if block.title
-                else ""
-            )
-            rows = "\n".join(_html_row(_texts(row), "td", stubs) for row in block.rows)
-            parts.append(f"<tbody>{titled}{rows}</tbody>")
-        parts += ["</table>", *(f"<p>{escape(note)}</p>" for note in table.notes)]
-    return "\n".join(parts) + "\n"
+def as_html(
+    title: str, caption: str, frame: pandas.DataFrame, stubs: int, notes: Sequence[str]
+) -> str:
+    """Return a table of texts as HTML elements, below a title."""
+    rows = [] if frame.empty else [frame.to_html(index=False, border=0)]
+    above = [f"<p><strong>{escape(title)}</strong></p>", f"<p>{escape(caption)}</p>"]
+    return "\n".join([*above, *rows, *(f"<p>{escape(note)}</p>" for note in notes)]) + "\n"
 
 
-def _html_row(texts: Sequence[str], element: str, stubs: int) -> str:
-    sides = ["left"] * stubs + ["right"] * (len(texts) - stubs)
-    cells = (
-        f'<{element} style="text-align: {side}">{escape(text)}</{element}>'
-        for text, side in zip(texts, sides, strict=True)
-    )
-    return f"<tr>{''.join(cells)}</tr>"
+def as_latex(
+    title: str, caption: str, frame: pandas.DataFrame, stubs: int, notes: Sequence[str]
+) -> str:
+    r"""Return a table of texts as a tabular for the package booktabs; title, caption and notes are
+    comments.
 
-
-def as_csv(title: str, tables: Sequence[Table]) -> str:
-    """Return tables separated by empty lines, each with a line of headings; blocks are a column."""
-    parts = []
-    for table in tables:
-        stream = io.StringIO()
-        writer = CsvWriter(stream)
-        first = [table.block] if table.block else []
-        headings = [heading or "figure" for heading in table.headings]
-        rows = [row for block in table.blocks for row in block.rows]
-        further = [*dict.fromkeys(name for row in rows for name, text in row.texts.items() if text)]
-        writer.writerow([*first, *map(ascii_units, [*headings, *table.spanned]), *further])
-        for block in table.blocks:
-            label = [block.title.removeprefix(f"{table.block} ")] if table.block else []
-            writer.writerows(
-                [
-                    *label,
-                    *map(ascii_units, row.headings),
-                    *(entry.text for entry in row.entries),
-                    *(row.texts.get(name, "") for name in further),
-                ]
-                for row in block.rows
-            )
-        parts.append(stream.getvalue())
-    return "\n".join(parts)
-
-
-def as_latex(title: str, tables: Sequence[Table]) -> str:
-    """Return a table environment for each table, without any package."""
-    parts = [f"% {' '.join(title.split())}"]
-    for table in tables:
-        stubs, count = len(table.headings), len(table.columns)
-        parts += ["\\begin{table}", "\\centering", f"\\caption{{{_latex(table.caption)}}}"]
-        parts += [f"\\begin{{tabular}}{{{'l' * stubs}{'r' * count}}}", "\\hline"]
-        if table.spanner:
-            parts.append(
-                f"{'& ' * stubs}\\multicolumn{{{count}}}{{c}}{{{_latex(table.spanner)}}} \\\\"
-            )
-        parts += [_latex_row([*table.headings, *table.columns]), "\\hline"]
-        for block in table.blocks:
-            parts += _latex_block(block, stubs + count)
-        parts += ["\\end{tabular}", "\\end{table}"]
-        parts += [_latex(note) + "\n" for note in table.notes]
-    return "\n".join(parts) + "\n"
-
-
-def _latex_block(block: Block, columns: int) -> list[str]:
-    title = (
-        [f"\\multicolumn{{{columns}}}{{l}}{{{_latex(block.title)}}} \\\\"] if block.title else []
-    )
-    return [*title, *(_latex_row(_texts(row)) for row in block.rows), "\\hline"]
-
-
-def _latex_row(texts: Sequence[str]) -> str:
-    return " & ".join(_latex(text) for text in texts) + " \\\\"
-
-
-LATEX = {
-    "\\": r"\textbackslash{}",
-    "~": r"\textasciitilde{}",
-    "^": r"\textasciicircum{}",
-    "<": r"\textless{}",
-    ">": r"\textgreater{}",
-    "|": r"\textbar{}",
-    '"': "{\\char34}",
-    # A bracket after \\ would be its argument.
-    "[": "{[}",
-    "]": "{]}",
-    "*": "{*}",
-    "µ": r"$\mu$",
-    "μ": r"$\mu$",
-    **{character: f"\\{character}" for character in "&%$#_{}"},
-}
-
-
-def _latex(text: str) -> str:
-    r"""Return text with LaTeX's special characters escaped, and micrometres in math mode.
-
-    >>> _latex("50 % of a_b, um")
-    '50 \\% of a\\_b, $\\mu$m'
-    >>> _latex("0.5 µm")
-    '0.5 $\\mu$m'
+    :raises ImportError: jinja2 is missing.
     """
-    if text == "-":
-        return "--"
-    escaped = "".join(LATEX.get(character, character) for character in text)
-    return re.sub(r"(^|, | or )u(m|rad)\b", r"\1$\\mu$\2", escaped)
+    sides = "l" * stubs + "r" * (len(frame.columns) - stubs)
+    rows = frame.to_latex(index=False, escape=True, column_format=sides).rstrip()
+    shown = [] if frame.empty else [rows]
+    return "\n".join([_comment(title), _comment(caption), *shown, *map(_comment, notes)]) + "\n"
 
 
-def _texts(row: Row) -> list[str]:
-    return [*row.headings, *(entry.text for entry in row.entries)]
-
-
-FORMATS: dict[str, Callable[[str, Sequence[Table]], str]] = {
-    "text": as_text,
-    "markdown": as_markdown,
-    "csv": as_csv,
-    "latex": as_latex,
-}
+def _comment(text: str) -> str:
+    return f"% {' '.join(text.split())}"

@@ -14,14 +14,6 @@ def escaped(text: str) -> str:
     return escape(in_one_line(text))
 
 
-def pitch(points: Array) -> float:
-    """Return the least distance between the first few hundred points."""
-    sample = points[:400]
-    distances = np.linalg.norm(sample[:, None] - sample[None], axis=2)
-    distances = distances[distances > 1e-9]
-    return float(distances.min()) if len(distances) else 1.0
-
-
 def on_paper(points: Array, lower: Array, scale: float, margin: float, height: float) -> Array:
     """Return points (n, 2) in a drawing of a `height`, whose second axis runs downwards, with the
     corner `lower` (2,) at its margins.

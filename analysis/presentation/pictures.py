@@ -9,7 +9,7 @@ import numpy as np
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.machines.protocol import Array
 
-from .scenes import Box, DrawnPosition, Scene, names_fit, scene
+from .scenes import Box, DrawnPosition, names_fit, scene
 from .svg import (
     INK,
     MUTED,
@@ -35,31 +35,27 @@ def draw_design(design: Design, words: str, path: str | Path | None = None) -> F
     :raises ValueError: the suffix is of no picture format.
     :raises OSError: the file cannot be written.
     """
+    drawn, places = scene(design)
     with drawing(330.0) as figure:
-        draw_scene(blank_axes(figure), scene(design))
+        axes = blank_axes(figure)
+        label_points, size = draw_box(axes, drawn), drawn.size
+        for place in places:
+            _place(axes, place)
+        # Numbers if names are too long.
+        by_number = not names_fit([place.name for place in places])
+        for place in places:
+            _name(axes, place, label_points, size, by_number)
+        # Room for labels around the volume and for plates that protrude from it.
+        drawn_points = np.concatenate(
+            [drawn.edges.reshape(-1, 2), *(place.outline for place in places)]
+        )
+        low = np.minimum(
+            drawn_points.min(axis=0) - 0.11 * size, np.min(label_points, axis=0) - 0.05 * size
+        )
+        high = drawn_points.max(axis=0) + 0.11 * size
+        axes.set_xlim(low[0], high[0])
+        axes.set_ylim(low[1], high[1])
         return save(figure, path, words)
-
-
-def draw_scene(axes: Axes, drawn: Scene) -> None:
-    """Draw the volume and its positions, labelled by names, or by numbers if these are too long, on
-    axes without a frame.
-    """
-    by_number = not names_fit([place.name for place in drawn.places])
-    label_points, size = draw_box(axes, drawn.box), drawn.box.size
-    for place in drawn.places:
-        _place(axes, place)
-    for place in drawn.places:
-        _name(axes, place, label_points, size, by_number)
-    # Room for labels around the volume and for plates that protrude from it.
-    drawn_points = np.concatenate(
-        [drawn.box.edges.reshape(-1, 2), *(place.outline for place in drawn.places)]
-    )
-    low = np.minimum(
-        drawn_points.min(axis=0) - 0.11 * size, np.min(label_points, axis=0) - 0.05 * size
-    )
-    high = drawn_points.max(axis=0) + 0.11 * size
-    axes.set_xlim(low[0], high[0])
-    axes.set_ylim(low[1], high[1])
 
 
 def draw_box(axes: Axes, box: Box) -> list[Array]:

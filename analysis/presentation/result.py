@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,7 +13,6 @@ from ballplate.simulator.inputs.settings import number_of
 from .files import write_file
 from .formats import as_html, as_latex, as_markdown
 from .formatting import Data, as_data
-from .table import Block, Entry, Row, Table
 from .table_columns import MainTable, table_rows
 
 if TYPE_CHECKING:
@@ -104,7 +104,7 @@ class Result:
         return self._written(as_markdown)
 
     def to_latex(self) -> str:
-        """Its main table in LaTeX, as a table environment that needs no package."""
+        """Its main table as a tabular of LaTeX, which needs the package booktabs."""
         return self._written(as_latex)
 
     def to_html(self) -> str:
@@ -134,26 +134,22 @@ class Result:
     def _repr_html_(self) -> str:
         return self._written(as_html, MOST_ROWS_SHOWN)
 
-    def _written(self, form: Callable[[str, Sequence[Table]], str], most: int | None = None) -> str:
-        """Title and up to `most` rows of the main table, with four digits and the number of omitted
-        rows; without rows, the headline.
+    def _written(self, form: Callable[..., str], most: int | None = None) -> str:
+        """Title, headline, up to `most` rows of the main table, with four digits, the number of
+        omitted rows, and notes.
         """
-        every, title = self._shown_rows(), self.heading
+        import pandas
+
+        every = self._shown_rows()
         rows = every[:most]
-        if not rows:
-            return form("; ".join([f"{title}: {self.headline()}", *self.notes]), [])
-        names = list(rows[0])
-        are_text = [all(isinstance(row[name], str) for row in rows) for name in names]
-        stubs = are_text.index(False) if False in are_text else len(names)
-        texts = [tuple(_shown(row[name]) for name in names) for row in rows]
-        block = Block(
-            "", tuple(Row(row[:stubs], tuple(Entry(text) for text in row[stubs:])) for row in texts)
-        )
-        heads = tuple(names[:stubs]), tuple(names[stubs:])
+        names = rows[0] if rows else ()
+        # The first columns, of texts alone, head the rows.
+        stubs = list(takewhile(lambda name: all(isinstance(row[name], str) for row in rows), names))
         left_out = len(every) - len(rows)
-        more = (f"and {left_out} more rows, which to_frame() has",) if left_out else ()
-        notes = (*more, *self.notes)
-        return form(title, [Table("", self.headline(), *heads, (block,), notes=notes)])
+        more = [f"and {left_out} more rows, which to_frame() has"] if left_out else []
+        cells = [{name: _shown(value) for name, value in row.items()} for row in rows]
+        frame = pandas.DataFrame(cells, dtype=str)
+        return form(self.heading, self.headline(), frame, len(stubs), [*more, *self.notes])
 
 
 class FitResult(Result):

@@ -53,21 +53,15 @@ class Box:
         return float(np.ptp(self.edges, axis=(0, 1)).max())
 
 
-@dataclass(frozen=True, eq=False)
-class Scene:
-    """A projected design, in metres: the volume and positions, rear first."""
-
-    box: Box
-    places: tuple[DrawnPosition, ...]
-
-
 def names_fit(names: Sequence[str]) -> bool:
     """Return whether positions are few and their names short enough to label a drawing."""
     return len(names) <= MOST_NAMES and all(len(name) <= LETTERS for name in names)
 
 
-def scene(design: Design) -> Scene:
-    """Return the scene of a design; one in two dimensions is seen from above."""
+def scene(design: Design) -> tuple[Box, list[DrawnPosition]]:
+    """Return the projected volume and positions of a design, rear first; one in two dimensions is
+    seen from above.
+    """
     view, towards = projection(design.dimension)
     volume = design.machine.volume
     points = locations(design, nominal_state(design), design.readings)
@@ -96,7 +90,7 @@ def scene(design: Design) -> Scene:
             )
         )
     places.sort(key=lambda place: -place.depth)
-    return Scene(box(volume.lower, volume.upper), tuple(places))
+    return box(volume.lower, volume.upper), places
 
 
 def box(lower: Array, upper: Array) -> Box:

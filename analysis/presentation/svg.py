@@ -132,11 +132,11 @@ def scale_bar(axes: Axes, length: float, height: float, text: str) -> None:
     axes.text(x + length + 0.02 * (upper - lower), height, text, va="center", **style)
 
 
-def legend_above(axes: Axes, columns: int, left: float = 0.0, bottom: float = 1.0) -> None:
+def legend_above(axes: Axes, columns: int) -> None:
     """Draw a legend in columns above axes."""
     axes.legend(
         loc="lower left",
-        bbox_to_anchor=(left, bottom),
+        bbox_to_anchor=(0.0, 1.0),
         ncols=columns,
         borderaxespad=0.3,
         borderpad=0.2,

@@ -11,16 +11,11 @@ if TYPE_CHECKING:
     from .verdicts import (
         Direction,
         Verdict,
-        changed_names,
-        effects,
-        independent_mixture,
         length,
         moved_positions,
         null_changes,
-        relative_changes,
         verdict,
         weak_changes,
-        weak_limit,
     )
 
 __getattr__, __dir__ = lazily(__name__, __file__)

@@ -18,7 +18,6 @@ from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.geometry.motions import without_rigid_motion
-from ballplate.simulator.inputs.extensions import optional_service
 from ballplate.simulator.inputs.quantities import Target
 from ballplate.simulator.inputs.settings import number_of
 from ballplate.simulator.machines.error_names import AXIS_ERRORS
@@ -156,7 +155,6 @@ class Verdict:
 
     `singular_values` are in standard deviations per micrometre, largest first, see `Spectrum`;
     `gap` is the ratio across the border between determined and undetermined, `GREAT` at most.
-    `reasons` are missing conditions of bars and gauges.
     """
 
     parameters: int
@@ -167,7 +165,6 @@ class Verdict:
     gap: float
     null: tuple[Direction, ...]
     weak: tuple[Direction, ...]
-    reasons: tuple[str, ...] = ()
 
     @property
     def as_expected(self) -> bool:
@@ -189,8 +186,6 @@ def verdict(
     design, layout, spectrum = at.design, at.layout, at.spectrum
     weak, effect = _weak_roots(at, target)
     limit = weak_limit(design, target)
-    open_ = np.concatenate([at.shared_null, weak], axis=1)
-    reasons = optional_service("bar_reasons")
     return Verdict(
         design.parameter_count,
         design.observation_count,
@@ -200,7 +195,6 @@ def verdict(
         spectrum.gap if np.isinf(spectrum.gap) else min(spectrum.gap, GREAT),
         null_directions(at),
         _weak_directions(design, layout, weak, effect, limit),
-        () if reasons is None else reasons(design, layout, open_),
     )
 
 
@@ -584,16 +578,3 @@ def _amount(value: float, unit: str) -> str:
     if "e+" in text and abs(amount) < 1e6:
         text = f"{float(text):.0f}"
     return f"{text} {SHOWN[unit]}"
-
-
-def changed_names(direction: Direction) -> list[str]:
-    """Return errors that a direction changes, or else artefacts, lengths, probes and positions."""
-    if direction.functions:
-        return [part.name for part in direction.functions]
-    parts: tuple[ArtefactPart | LengthPart | PositionPart, ...] = (
-        *direction.artefacts,
-        *direction.lengths,
-        *direction.probes,
-        *direction.positions,
-    )
-    return [part.name for part in parts]

@@ -8,24 +8,19 @@ from ballplate.simulator.inputs.faces import lazily
 
 # Public names of this package: extensions import these alone, and its modules are private.
 if TYPE_CHECKING:
-    from .adjustments import ARCSECOND, FEW, coverage_factor, few_degrees_of_freedom, freedom_words
+    from .adjustments import FEW, few_degrees_of_freedom, freedom_words
     from .checked_designs import PlannedUncertainty, check, planned_uncertainty, predict
     from .diagnosis import has_exact_values
     from .error_functions import estimated_curves
     from .estimates import (
-        ESTIMATE_COLUMNS,
-        EstimatedFunctions,
-        Function,
         ParameterEstimate,
-        estimated_functions,
         labels,
     )
     from .fits import Fit
     from .fitting import fit
-    from .groupings import GROUPINGS, Grouping
-    from .map_of_fit import FRAMES, MappedFit, data_of, left_out_words
+    from .map_of_fit import data_of, left_out_words
     from .prediction import Prediction
-    from .qualifications import Qualification, given_words, qualification_data
+    from .qualifications import Qualification, given_words, qualification_data, qualifications_of
     from .residuals import reading_residuals
     from .sigmas_by_campaign import campaign_sigmas, with_sigmas
     from .text_blocks import scale_lines, target_lines, verdict_lines

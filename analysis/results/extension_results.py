@@ -4,18 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Protocol
 
 from ballplate.presentation.formatting import Data
-from ballplate.simulator.inputs.extensions import function, optional_function
-
-
-class SpaceView(Protocol):
-    """A picture in space, which a notebook shows."""
-
-    def save(self, path: str | Path) -> None: ...
-
-    def _repr_html_(self) -> str: ...
 
 
 class AskedResult(Protocol):
@@ -51,13 +42,6 @@ class AskedAssumptions(AskedResult, Protocol):
     def explains(self) -> bool: ...
 
 
-class GroupVariances(AskedResult, Protocol):
-    """Estimated variances of `groups` of observations."""
-
-    @property
-    def groups(self) -> Sequence[Any]: ...
-
-
 class IssuedCertificate(AskedResult, Protocol):
     """A plate's co-ordinates in its own axes, by their `datum`; `texts` are files by name."""
 
@@ -65,18 +49,3 @@ class IssuedCertificate(AskedResult, Protocol):
     def datum(self) -> str: ...
 
     def texts(self, path: str | Path) -> Mapping[Path, str]: ...
-
-
-def shown_in_space(result: object) -> SpaceView:
-    """Return the view of a prediction or a fit.
-
-    :raises MissingExtensionError: the extension that draws it is not installed.
-    """
-    view: SpaceView = function("view")(result)
-    return view
-
-
-def picture_in_space(result: object) -> str:
-    """Return the view as HTML for a notebook; empty without the extension that draws it."""
-    view = optional_function("view")
-    return "" if view is None else str(view(result)._repr_html_())

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from ballplate.presentation.files import write_file
-from ballplate.presentation.formats import as_html
 from ballplate.presentation.formatting import Data, given, picked
 from ballplate.presentation.result import FitResult
 from ballplate.presentation.scenes import box_edges, projection
@@ -30,14 +29,8 @@ from ballplate.results.estimates import (
 )
 from ballplate.results.extension_results import (
     AskedAssumptions,
-    AskedResult,
-    GroupVariances,
     IssuedCertificate,
-    SpaceView,
-    picture_in_space,
-    shown_in_space,
 )
-from ballplate.results.groupings import GROUPINGS, Grouping
 from ballplate.results.map_of_fit import counted_twice, map_of
 from ballplate.results.plates import PlateCoordinates
 from ballplate.results.prediction import by_label, length_headline, rank_words
@@ -57,10 +50,9 @@ from ballplate.results.text_blocks import (
     verdict_data,
     verdict_lines,
 )
-from ballplate.simulator.computing.steps import Report, unreported
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.gauss_newton import Solution
-from ballplate.simulator.inputs.arguments import ensure_one_of, ensure_positive, ensure_type
+from ballplate.simulator.inputs.arguments import ensure_positive, ensure_type
 from ballplate.simulator.inputs.extensions import function, optional_service, service
 from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.machines.protocol import Array
@@ -82,9 +74,6 @@ if TYPE_CHECKING:
 # Steps of an iteration below this, in metres and radians, are reported as rounding.
 LEAST_STEP = 1e-10
 
-# Rows of the table of estimates in a notebook, so that the view below stays visible.
-ROWS_BESIDE_VIEW = 12
-
 # Largest residuals in the text.
 SHOWN_RESIDUALS = 3
 
@@ -98,9 +87,9 @@ class Fit(FitResult):
     root of S^2 over the degrees of freedom, or 1 if the file takes uncertainties as given.
     `adjustments` are those of a three-dimensional metric. `diagnosis` flags gross errors, which
     stay in the fit, or `untested` states why there is none. `estimated` has all estimates as
-    functions of the parameters, without `sigma`. `variance_components` are optional.
-    `experiment` was fitted. `campaigns` are the sigmas of prior maps; if these are separate,
-    `degrees_of_freedom` are the fewest of them.
+    functions of the parameters, without `sigma`. `experiment` was fitted.
+    `campaigns` are the sigmas of prior maps; if these are separate, `degrees_of_freedom` are the
+    fewest of them.
     """
 
     label: str
@@ -119,9 +108,7 @@ class Fit(FitResult):
     diagnosis: Suspicion | None = None
     untested: str = ""
     estimated: EstimatedFunctions | None = None
-    variance_components: GroupVariances | None = None
     experiment: Experiment | None = None
-    bootstrap: AskedResult | None = None
     campaigns: CampaignSigmas | None = None
 
     @property
@@ -171,8 +158,6 @@ class Fit(FitResult):
             lines += self._suspicion.lines(self.observed.marks)
         if self.assumptions is not None:
             lines += ["", *self.assumptions.lines()]
-        if self.variance_components is not None:
-            lines += ["", *self.variance_components.lines()]
         lines += ["", *uncertainty_table(self.quantities, self.lack_of_fit.caveat), ""]
         lines += [*task_table(self.tasks, self.lack_of_fit.caveat), ""] if self.tasks else []
         printed = [
@@ -192,13 +177,10 @@ class Fit(FitResult):
             lines += ["", *adjustment_lines(self.adjustments)]
         for plate in self.plates:
             lines += ["", *plate_table(plate, named=len(self.plates) > 1)]
-        if self.bootstrap is not None:
-            lines += ["", *self.bootstrap.lines()]
         return lines
 
     def data(self) -> Data:
         estimates = zip(labels(self.estimates), self.estimates, strict=True)
-        components = self.variance_components
         curves = self.error_functions if self.converged else ()
         return {
             **self.named,
@@ -227,13 +209,6 @@ class Fit(FitResult):
                 suspected=self._suspicion and self._suspicion.data(self.observed.marks),
                 assumptions=self.assumptions and self.assumptions.to_dict(),
             ),
-            **(
-                {}
-                if components is None
-                else {
-                    "variance_components": components.to_dict(),
-                }
-            ),
             "estimates": {
                 name: picked(item, "value", "standard_uncertainty", "unit")
                 for name, item in estimates
@@ -241,7 +216,6 @@ class Fit(FitResult):
             **given(
                 plates={plate.artefact: plate_data(plate) for plate in self.plates},
                 adjustments=adjustment_data(self.adjustments),
-                bootstrap=self.bootstrap and self.bootstrap.to_dict(),
             ),
             **self.notes_data(),
         }
@@ -317,15 +291,6 @@ class Fit(FitResult):
         """
         return str(function("page")(self))
 
-    def view(self) -> SpaceView:
-        """The fit in space: positions, residuals, ellipsoids of points and balls, and moving
-        undetermined or weak directions; of a failed fit only the positions.
-        """
-        return shown_in_space(self)
-
-    def _repr_html_(self) -> str:
-        return self._written(as_html, ROWS_BESIDE_VIEW) + picture_in_space(self)
-
     def covariance(self, *chosen: str) -> pandas.DataFrame:
         """Covariance of estimates and measuring tasks, in products of their units; NaN if
         undetermined.
@@ -356,49 +321,6 @@ class Fit(FitResult):
         spread = np.sqrt(np.diagonal(covariance))
         with np.errstate(invalid="ignore", divide="ignore"):
             return covariance / np.outer(spread, spread)
-
-    def components(self, by: Grouping = "axis") -> GroupVariances:
-        """Variances of groups of observations relative to stated ones, by restricted maximum
-        likelihood.
-
-        `by` is axis, probe, position, artefact or calibration.
-
-        :raises ValueError: another grouping, an estimate that has not converged, or too many groups
-            for the memory.
-
-        >>> import ballplate as bp
-        >>> fit = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart()))
-        >>> [group.verdict for group in fit.components("calibration").groups]
-        ['agrees with stated', 'agrees with stated']
-        """
-        ensure_one_of(GROUPINGS, by=by)
-        at = self.functions.at
-        variances: GroupVariances = service("variance_components")(
-            self.label, self.title, at, self.observed.x, by
-        )
-        return variances
-
-    def with_trials(
-        self, trials: int, seed: int, workers: int = 1, report: Report = unreported
-    ) -> Fit:
-        """The fit with standard deviations of its estimates over simulated data sets, each fitted
-        again, as `bootstrap`.
-
-        :raises ValueError: an estimate that has not converged, or errors too large for readings to
-            exist.
-        """
-        bootstrap = service("bootstrap")(
-            self.label,
-            self.title,
-            self.functions,
-            self.sigma,
-            self.sigma_is_estimated,
-            trials,
-            seed,
-            workers,
-            report,
-        )
-        return replace(self, bootstrap=bootstrap)
 
     def correct(self, points: Array, probe: str | Sequence[str] | None = None) -> CorrectedPoints:
         """Scale readings (n, d) in metres, corrected for the estimated errors, with their joint
@@ -442,7 +364,7 @@ class Fit(FitResult):
         about: Mapping[str, str] | None = None,
     ) -> IssuedCertificate:
         """The co-ordinates of a plate's balls in its own axes with their full covariance, to be
-        written as a page, tables, a digital calibration certificate or a GTC archive.
+        written as a page, tables or a digital calibration certificate.
 
         `datum` names the ball at the origin, one on an axis and, in space, one in the xy plane, or
         is "all"; by default corners of the plate. The coverage factor is by default that of the

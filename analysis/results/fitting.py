@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.inputs.extensions import service
-from ballplate.simulator.inputs.messages import refused
 from ballplate.simulator.machines.error_names import SquarenessError
 from ballplate.simulator.machines.kinematic import KinematicModel
 from ballplate.simulator.machines.plane import PlaneModel
-from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 
@@ -25,7 +22,6 @@ from .checked_designs import check
 from .diagnosis import diagnosed
 from .estimates import estimated_functions, parameter_estimates
 from .fits import Fit
-from .groupings import Grouping
 from .plates import plate_coordinates
 from .residuals import largest_residuals
 from .sigmas_by_campaign import CampaignSigmas, campaign_sigmas
@@ -38,15 +34,11 @@ def fit(
     observed: ObservedReadings,
     sigma: Literal["estimated", "given"] | None = None,
     monomials: bool = False,
-    components: Grouping | None = None,
 ) -> Fit:
     """Estimate machine errors, balls and poses from readings.
 
     `sigma` overrides the file's; with `monomials` the machine's parameters are the coefficients of
-    t, t^2, ... on [0, 1] instead of those of the stable basis. `components` adds variances of
-    groups of observations.
-
-    :raises ExperimentError: variance components take more memory than there is.
+    t, t^2, ... on [0, 1] instead of those of the stable basis.
     """
     is_estimated = (sigma or experiment.sigma) == "estimated"
     campaigns = campaign_sigmas(experiment, observed) if is_estimated else None
@@ -63,9 +55,6 @@ def fit(
     own_freedom = at.degrees_of_freedom
     scale, estimated, freedom = _sigma(at, campaigns, is_estimated)
     diagnosis, untested = diagnosed(at, observed.x, own_freedom, estimated)
-    variances = None
-    if components is not None:
-        variances = _variance_components(experiment, at, observed.x, components)
     judged = verdict(at, experiment.expected_rank_deficiency, experiment.target_uncertainty)
     functions = estimated_functions(at, monomials)
     return Fit(
@@ -85,7 +74,6 @@ def fit(
         diagnosis,
         untested,
         functions,
-        variances,
         experiment=experiment,
         campaigns=campaigns,
     )
@@ -101,13 +89,6 @@ def _sigma(
     estimated = is_estimated and freedom > 0
     sigma = float(np.sqrt(squares / freedom)) if estimated else 1.0
     return sigma, estimated, freedom if campaigns is None else campaigns.degrees_of_freedom
-
-
-def _variance_components(experiment: Experiment, at: Linearisation, x: Array, by: Grouping) -> Any:
-    try:
-        return service("variance_components")(experiment.label, experiment.title, at, x, by)
-    except ValueError as error:
-        raise refused(experiment.source, str(error), "positions") from None
 
 
 def _adjustments(at: Linearisation, sigma: float, freedom: float) -> tuple[Adjustment, ...]:

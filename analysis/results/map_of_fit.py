@@ -22,7 +22,6 @@ from ballplate.simulator.inputs.settings import listing, number_of
 from ballplate.simulator.inputs.yamltree import to_python, written
 from ballplate.simulator.maps.fit_verdict import LackOfFit
 from ballplate.simulator.maps.fitted_map import (
-    CONVERSION,
     FittedMap,
     LeftOut,
     MapData,
@@ -31,7 +30,6 @@ from ballplate.simulator.maps.fitted_map import (
 from ballplate.simulator.readings.fingerprints import fingerprint, position_fingerprints
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 
-from ..presentation.formatting import number
 from .estimates import ParameterEstimate
 from .extension_results import AskedAssumptions
 
@@ -212,25 +210,8 @@ def _by_position(settings: TemperaturesSettings, word: str, positions: Sequence[
 
 
 def left_out_words(fitted: FittedMap) -> str:
-    """Return estimates of the fit that a map does not apply, and effects of its conversion."""
-    residual = fitted.conversion_residual
-    sentences = []
-    if residual is not None:
-        effect = (
-            f"corrected points differ by up to {number(1e6 * residual, 3)} µm from those of the map"
-            " before, which U does not contain"
-            if residual
-            else "coefficients that the model before did not have are as it implies, and were not"
-            " estimated from readings"
-        )
-        sentences.append(f"the map was converted from another error model: {effect}")
-    campaign = [estimate.name for estimate in fitted.left_out if estimate.kind != CONVERSION]
-    if campaign:
-        sentences.append(_of_campaign(campaign))
-    return "; ".join(sentences)
-
-
-def _of_campaign(estimated: Sequence[str]) -> str:
+    """Return the estimates of the fit that a map does not apply."""
+    estimated = [estimate.name for estimate in fitted.left_out]
     names, count = listing(estimated, 4), len(estimated)
     return (
         f"{number_of(count, 'parameter')} of influence quantities that the fit estimated"

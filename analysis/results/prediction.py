@@ -23,13 +23,13 @@ from ..rank.verdicts import Verdict
 from ..uncertainty.scale import Scale, scale_of
 from ..uncertainty.summaries import Quantity, tasks_of
 from ..uncertainty.tasks import TaskUncertainty
-from .extension_results import PredictedAssumptions, SpaceView, picture_in_space, shown_in_space
+from .extension_results import PredictedAssumptions
 from .influences import InfluenceUncertainty, influence_data, influence_table
 from .qualifications import (
     Qualification,
     given_words,
     qualification_data,
-    qualifications,
+    qualifications_of,
 )
 from .text_blocks import (
     QUANTITY_COLUMNS,
@@ -95,7 +95,7 @@ class Prediction(Result):
     def qualifications(self) -> tuple[Qualification, ...]:
         """What the figures and verdicts take for granted, as every output states it."""
         deficiency = self.verdict.deficiency
-        return tuple(qualifications(deficiency, self.scale, self.assumptions, self.experiment))
+        return tuple(qualifications_of(deficiency, self.scale, self.assumptions, self.experiment))
 
     @property
     def qualified(self) -> list[str]:
@@ -205,15 +205,6 @@ class Prediction(Result):
 
         names = ", ".join(self.design.positions.names)
         return draw_design(self.design, f"{self.title}: positions {names} in the volume", path)
-
-    def view(self) -> SpaceView:
-        """The design in space: positions, ellipsoids of points and balls, and moving undetermined
-        or weak directions.
-        """
-        return shown_in_space(self)
-
-    def _repr_html_(self) -> str:
-        return super()._repr_html_() + picture_in_space(self)
 
     def columns(self) -> MainTable:
         """One row for each of U1 to U6; without these, one with the rank and U6."""

@@ -31,7 +31,7 @@ class Qualification:
     text: str
 
 
-def qualifications(
+def qualifications_of(
     deficiency: int,
     scale: Scale | None,
     assumptions: PredictedAssumptions | None,

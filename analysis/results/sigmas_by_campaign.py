@@ -29,8 +29,6 @@ from ballplate.simulator.readings.observed_readings import ObservedReadings
 # become too short where one campaign has few degrees of freedom.
 LEVEL = 0.25
 
-NOT_STATED = "the map is older and does not state its sum of squares"
-
 
 @dataclass(frozen=True)
 class ScaledMap:
@@ -59,8 +57,7 @@ class ScaledMap:
         if not test:
             verb = "agree" if self.is_common else "differ"
             test = f"they {verb}, p = {number(self.p_value, 2)} against a level of {LEVEL:g}"
-        lack = "" if campaign.is_stated else f"; {NOT_STATED}"
-        return f"sigma of {campaign.file}: {sigma}; {test}: the map {result}{lack}"
+        return f"sigma of {campaign.file}: {sigma}; {test}: the map {result}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,7 +198,7 @@ def compared(campaign: EarlierCampaign, own_sigma: float, own_freedom: int) -> S
     from scipy.special import fdtr, fdtrc
 
     if campaign.sum_of_squares is None:
-        return ScaledMap(campaign, math.nan, False, "its residuals are unknown")
+        return ScaledMap(campaign, math.nan, False, "its residuals are rounding")
     if not campaign.degrees_of_freedom or not own_freedom:
         return ScaledMap(campaign, math.nan, True, "no test for want of degrees of freedom")
     if own_sigma < LEAST_SIGMA:

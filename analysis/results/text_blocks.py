@@ -155,7 +155,6 @@ def verdict_lines(
             lines.append(f"{title}: {len(listed) - 20} directions more")
     if judged.weak and lengths is not None:
         lines.append(f"all directions together: {_lengths_words(lengths)}")
-    lines += [f"reason: {reason}" for reason in judged.reasons]
     return lines
 
 
@@ -295,19 +294,21 @@ def _border(judged: Verdict) -> str:
     return f", then {printable(first):.3g} and below (gap {printable(judged.gap):.2g})"
 
 
-def plate_table(plate: PlateCoordinates, named: bool = False, most: int = MOST_BALLS) -> list[str]:
-    """Return a plate's co-ordinates in its own axes as lines of text, for at most `most` balls."""
+def plate_table(plate: PlateCoordinates, named: bool) -> list[str]:
+    """Return a plate's co-ordinates in its own axes as lines of text, of up to `MOST_BALLS`."""
     title = "co-ordinates of the balls in the plate's own axes"
     lines = [f"{plate.artefact + ': ' if named else ''}{title} ({plate.words})"]
-    (x, y), (u, v) = plate.coordinates[:most].T, plate.standard_uncertainties[:most].T
+    (x, y), (u, v) = (
+        array[:MOST_BALLS].T for array in (plate.coordinates, plate.standard_uncertainties)
+    )
     columns = {
-        "ball": list(plate.names[:most]),
+        "ball": list(plate.names[:MOST_BALLS]),
         "x, mm": (x, u),
         "y, mm": (y, v),
         "standard uncertainty of x, µm": (u, 3),
         "of y, µm": (v, 3),
     }
-    omitted = len(plate.names) - most
+    omitted = len(plate.names) - MOST_BALLS
     more = [f"({omitted} balls more in --json)"] if omitted > 0 else []
     return [*lines, *table_lines(columns), *more]
 
@@ -388,7 +389,6 @@ def verdict_data(judged: Verdict) -> Data:
         "expected_rank_deficiency": judged.expected,
         **picked(judged, "as_expected", "singular_values", "gap"),
         "undetermined": list(map(str, judged.null)),
-        "reasons": judged.reasons,
         "weakly_determined": [
             {
                 "text": str(direction),

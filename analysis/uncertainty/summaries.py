@@ -23,7 +23,7 @@ from ballplate.simulator.estimation.functions import (
     displacements,
 )
 from ballplate.simulator.estimation.linearisation import Linearisation
-from ballplate.simulator.inputs.quantities import LengthFunction, Target
+from ballplate.simulator.inputs.quantities import Target
 from ballplate.simulator.machines.protocol import Array
 
 from .kernel_quantities import evaluation_points
@@ -211,15 +211,13 @@ def _point(places: MeasuredPoints, label: int) -> str:
     return f"point {label + 1} at ({coordinates}) mm"
 
 
-def point_pairs(
-    at: Linearisation, limit: LengthFunction | None = None
-) -> tuple[Array, PairSummary]:
+def point_pairs(at: Linearisation) -> tuple[Array, PairSummary]:
     """Return uncertainties of the corrected evaluation points' co-ordinates (n, d), and of all
     distances between them.
     """
     places = evaluation_points(at.design)
     moved = displacements(at, places)
-    return moved.uncertainties, all_pairs(moved, places.labels, limit)
+    return moved.uncertainties, all_pairs(moved, places.labels)
 
 
 def summarise(symbol: str, values: Array, unit: str, name_of: Callable[[int], str]) -> Quantity:

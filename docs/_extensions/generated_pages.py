@@ -12,25 +12,21 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from ballplate.cli import GROUPS
 from ballplate.cli import parser as command_line
-from ballplate.extensions.reproduction.compare import reproduce
-from ballplate.extensions.reproduction.published import npl
-from ballplate.extensions.reproduction.reproduction_tables import reproduction_markdown
-from ballplate.extensions.reproduction.shipped import Shipped
 from ballplate.extensions.sweeps.sweep_schema import schema as sweep_schema
 from ballplate.simulator.experiment.json_schema import schema
 from ballplate.simulator.experiment.machine_sections import machine_schema
 from ballplate.simulator.experiment.map_sections import map_schema
-from ballplate.simulator.inputs.moved import MOVED
 from ballplate.simulator.inputs.quantities import (
-    UNITS,
+    KINDS,
     Angle,
     Bending,
     Duration,
     Expansion,
     Length,
-    LengthFunction,
     Ratio,
+    TargetFunction,
     TemperatureDifference,
 )
 from pydantic import TypeAdapter
@@ -39,9 +35,6 @@ from sphinx.application import Sphinx
 Schema = dict[str, Any]
 
 TOP = Path(__file__).resolve().parents[2]
-
-# As many as the command takes unless told.
-DATA_SETS = 100
 
 QUANTITIES = {
     TypeAdapter(kind).json_schema()["pattern"]: words
@@ -53,7 +46,7 @@ QUANTITIES = {
         (Expansion, "thermal expansion"),
         (Bending, "angle per length"),
         (Duration, "duration"),
-        (LengthFunction, "length, or one that grows as `A + L/K`"),
+        (TargetFunction, "length, or one that grows as `A + L/K`"),
     )
 }
 
@@ -81,13 +74,6 @@ def map_format() -> str:
     return _keys(whole)
 
 
-def reproduction(data_sets: int = DATA_SETS) -> str:
-    """The published figures beside ours, as Markdown."""
-    found = reproduce(npl(), Shipped(TOP / "designs" / "npl"), (), data_sets)
-    # The page has a title of its own.
-    return reproduction_markdown(found).partition("\n")[2]
-
-
 def _keys(whole: Schema) -> str:
     sections = dict(_sections(whole))
     lines = ["## The file", "", *_table(whole, whole, sections)]
@@ -106,7 +92,8 @@ def _keys(whole: Schema) -> str:
 def units() -> str:
     """The units of quantities as Markdown."""
     return "\n".join(
-        f"- {kind}: {', '.join(f'`{unit}`' for unit in names)}" for kind, names in UNITS.items()
+        f"- {kind}: {', '.join(f'`{unit}`' for unit in about.units)}"
+        for kind, about in KINDS.items()
     )
 
 
@@ -178,11 +165,9 @@ def _form(part: Schema, whole: Schema) -> str:
         return _list_form(part, whole)
     if kind == "object":
         below = part.get("additionalProperties")
-        return (
-            f"name → {_form(below, whole)}"
-            if isinstance(below, dict) and below
-            else "name → any value"
-        )
+        names = ", ".join(part.get("propertyNames", {}).get("enum", ["name"]))
+        is_any = not isinstance(below, dict) or not below
+        return f"{names} → {'any value' if is_any else _form(below, whole)}"
     if kind == "string":
         return QUANTITIES.get(part.get("pattern", ""), "text")
     if kind == ["string", "integer"]:
@@ -219,26 +204,34 @@ def _anchor(name: str, whole: Schema) -> str:
     return f"{prefix}-{name.lower()}"
 
 
+def _subparsers(top: argparse.ArgumentParser) -> Any:
+    (found,) = (action for action in top._actions if isinstance(action, argparse._SubParsersAction))
+    return found
+
+
+def command_table() -> str:
+    """The commands in the groups of the help, as Markdown."""
+    listed = _subparsers(command_line())._choices_actions
+    lines = ["| to | command | does |", "|---|---|---|"]
+    for group, title in GROUPS.items():
+        for action in (action for action in listed if action.group == group):
+            name = f"[`{action.dest}`](#ballplate-{action.dest})"
+            lines.append(f"| {title} | {name} | {action.help} |")
+            title = ""
+    return "\n".join(lines)
+
+
 def commands() -> str:
     """All commands with their options, as Markdown."""
     top = command_line()
-    (subparsers,) = (
-        action for action in top._actions if isinstance(action, argparse._SubParsersAction)
-    )
     lines = [*_usage(top), "", top.epilog or ""]
-    for name, parser in subparsers.choices.items():
+    for name, parser in _subparsers(top).choices.items():
         lines += ["", f"## ballplate {name}", "", *_usage(parser), "", parser.description or ""]
         lines += ["", f"```{{program}} ballplate {name}", "```"]
         for action in parser._actions:
             if not isinstance(action, argparse._HelpAction):
                 lines += ["", "````{option} " + _invocation(action), _text(action), "````"]
     return "\n".join(lines)
-
-
-def moved() -> str:
-    """What moved, as Markdown."""
-    rows = [f"| `{old}` | `{new}` |" for old, new in MOVED.items()]
-    return "\n".join(["| before | now |", "|---|---|", *rows])
 
 
 def _usage(parser: argparse.ArgumentParser) -> list[str]:
@@ -261,22 +254,19 @@ def _text(action: argparse.Action) -> str:
     return (action.help or "").replace("%%", "%") + "."
 
 
-REPRODUCTION = "<!-- reproduction -->"
 PARTS = {
     "<!-- file format -->": file_format,
     "<!-- sweep format -->": sweep_format,
     "<!-- machine format -->": machine_format,
     "<!-- map format -->": map_format,
     "<!-- units -->": units,
+    "<!-- command table -->": command_table,
     "<!-- commands -->": commands,
-    "<!-- moved -->": moved,
-    REPRODUCTION: reproduction,
 }
 
 
 def _fill(app: Sphinx, page: str, source: list[str]) -> None:
-    parts = {**PARTS, REPRODUCTION: lambda: reproduction(app.config.data_sets)}
-    for marker, part in parts.items():
+    for marker, part in PARTS.items():
         if marker in source[0]:
             source[0] = source[0].replace(marker, part())
             # The program may have changed although the page has not.
@@ -284,7 +274,5 @@ def _fill(app: Sphinx, page: str, source: list[str]) -> None:
 
 
 def setup(app: Sphinx) -> dict[str, bool]:
-    # Fewer are drawn where it is tested that the pages can be built.
-    app.add_config_value("data_sets", DATA_SETS, "env", int)
     app.connect("source-read", _fill)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -189,14 +189,12 @@ def _start_trackers() -> None:
 
 
 @contextmanager
-def interruptions_blocked() -> Iterator[None]:
-    """Let processes inherit that interruptions are blocked, until they have loaded what ignores
-    them.
-    """
+def interruptions_blocked(*others: int) -> Iterator[None]:
+    """Block SIGINT, and other signals, until the end; processes started meanwhile inherit it."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT, *others])
     try:
         yield
     finally:

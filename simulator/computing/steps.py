@@ -14,7 +14,7 @@ class ProgressStep:
     """Progress of a step: its name, the number done, and the total.
 
     `before` were done in an earlier run; `remark` is an additional text. Where it `can_end`, the
-    report may raise `EnoughError`. Others follow unless it `is_last`.
+    report may raise `EnoughError`.
 
     >>> print(ProgressStep("data sets", 512, 2048, "accurate to 1.5 %"))
     512 of 2048 data sets, accurate to 1.5 %
@@ -26,7 +26,6 @@ class ProgressStep:
     remark: str = ""
     before: int = 0
     can_end: bool = False
-    is_last: bool = True
 
     def __str__(self) -> str:
         remark = f", {self.remark}" if self.remark else ""

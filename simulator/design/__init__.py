@@ -20,17 +20,12 @@ if TYPE_CHECKING:
         nominal_places,
         nominal_state,
         read_in_positions,
-        reading_noise,
         reading_uncertainties,
     )
     from .influences.displacements import SharedDisplacements
     from .influences.drift import (
-        HOUR,
         Clock,
         Drift,
-        DriftSettings,
-        PointDriftSettings,
-        ScaleDriftSettings,
         even_clock,
     )
     from .influences.position_scale import PositionScale
@@ -42,7 +37,7 @@ if TYPE_CHECKING:
         InfluenceSettings,
     )
     from .influences.sag import Sag, SagSettings
-    from .influences.temperature import COLDEST, WARMEST, TemperaturesSettings
+    from .influences.temperature import TemperaturesSettings
     from .lookup import Indices, References
     from .objects import SLIGHTLY, Flags, Tasks, Volume
     from .observations.balls import BallObservations
@@ -78,7 +73,7 @@ if TYPE_CHECKING:
     )
     from .observations.star import Stars
     from .observations.stated_values import CertificateEntry, FileValues, value_name
-    from .observations.whitening import CovarianceRoot, Whitening, at_least_exact
+    from .observations.whitening import CovarianceRoot, Whitening
     from .parameters import SharedLayout, shared_layout
 
 __getattr__, __dir__ = lazily(__name__, __file__)

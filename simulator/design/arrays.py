@@ -436,12 +436,6 @@ class Observations(ABC):
         """The same observations with other values or uncertainties (m,)."""
         return cast(Self, replace(cast(Any, self), **changed))
 
-    def enlarged(self, times: Array) -> Self:
-        """Return the same observations with uncertainties `times` (rows,) as large; rows that
-        share errors change together.
-        """
-        return self.given(uncertainty=self.uncertainty * times)
-
     def whitened(self, rows: Array) -> Array:
         """Return changes (m, ...) of the values in uncorrelated rows (count, ...) of unit
         variance.

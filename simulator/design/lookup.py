@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -26,13 +27,6 @@ Indices = NDArray[np.intp]
 MOST_READINGS = 2_000_000
 
 
-@dataclass
-class ReadingCount:
-    """Readings counted so far."""
-
-    readings: int = 0
-
-
 @dataclass(frozen=True, eq=False)
 class References:
     """Objects that can be referred to.
@@ -51,7 +45,7 @@ class References:
     layouts: dict[str, BallLayout]
     trust: Trust = UNKNOWN
     volume: Volume | None = None
-    tally: ReadingCount = field(default_factory=ReadingCount)
+    tally: Counter[str] = field(default_factory=Counter)
 
     def file(self, name: object) -> Path:
         """Return the file that the experiment names.
@@ -62,15 +56,15 @@ class References:
 
     def count_readings(self, count: int, steps: Steps) -> bool:
         """Count further readings; return false, after one message, if there are too many."""
-        before = self.tally.readings
-        self.tally.readings += count
-        if before <= MOST_READINGS < self.tally.readings:
+        before = self.tally["readings"]
+        self.tally["readings"] += count
+        if before <= MOST_READINGS < self.tally["readings"]:
             text = (
-                f"there are {self.tally.readings} readings up to here, repeats counted; at most"
+                f"there are {self.tally['readings']} readings up to here, repeats counted; at most"
                 f" {MOST_READINGS} are possible: read fewer balls, or less often"
             )
             self.problems.add(steps, text)
-        return self.tally.readings <= MOST_READINGS
+        return self.tally["readings"] <= MOST_READINGS
 
     def artefact(self, name: str | None, steps: Steps) -> str | None:
         """Return the artefact of a position or calibration, or report faults."""

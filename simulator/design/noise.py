@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from pydantic import Field
 
 from ..inputs.settings import Settings
-from ..machines.protocol import Integers
+from ..machines.protocol import Array, Integers
 
-Precision = type[np.float32] | type[np.float64]
 Distribution = Literal["normal", "uniform", "student t"]
 
 
@@ -49,27 +48,22 @@ class Noise:
         shape: tuple[int, ...],
         position: Integers,
         axis: int,
-        dtype: Precision = np.float64,
-    ) -> Any:
+    ) -> Array:
         """Noise of a `shape` whose `axis` counts readings, made in `position` (m,)."""
-        noise = self._independent(generator, shape, dtype)
+        noise = self._independent(generator, shape)
         if not self.correlation:
             return noise
         names, place = np.unique(position, return_inverse=True)
         of_positions = [*shape]
         of_positions[axis] = len(names)
-        common = generator.standard_normal(of_positions).astype(dtype)
-        noise *= np.sqrt(1.0 - self.correlation)
-        noise += np.sqrt(self.correlation) * np.take(common, place.ravel(), axis)
-        return noise.astype(dtype, copy=False)
+        common = generator.standard_normal(of_positions)
+        shared = np.sqrt(self.correlation) * np.take(common, place.ravel(), axis)
+        return np.sqrt(1.0 - self.correlation) * noise + shared
 
-    def _independent(
-        self, generator: np.random.Generator, shape: tuple[int, ...], dtype: Precision
-    ) -> Any:
+    def _independent(self, generator: np.random.Generator, shape: tuple[int, ...]) -> Array:
         if self.distribution == "normal":
-            return generator.standard_normal(shape, dtype)
+            return generator.standard_normal(shape)
         if self.distribution == "uniform":
-            half = np.sqrt(3.0)
-            return generator.uniform(-half, half, shape).astype(dtype, copy=False)
+            return generator.uniform(-np.sqrt(3.0), np.sqrt(3.0), shape)
         nu = self.degrees_of_freedom
-        return (generator.standard_t(nu, shape) * np.sqrt(1.0 - 2.0 / nu)).astype(dtype, copy=False)
+        return generator.standard_t(nu, shape) * np.sqrt(1.0 - 2.0 / nu)

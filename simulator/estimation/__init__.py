@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     )
     from .gauss_newton import (
         Solution,
-        Status,
         as_drawn,
         estimate,
         linearised_fit,
@@ -37,6 +36,5 @@ if TYPE_CHECKING:
     from .initial import initial_state
     from .linearisation import LinearFunctions, Linearisation, linearise
     from .spheres import FEWEST_POINTS, FLAT, SphereFit, closest_sphere, fit_sphere
-    from .substitution import in_order
 
 __getattr__, __dir__ = lazily(__name__, __file__)

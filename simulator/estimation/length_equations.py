@@ -98,14 +98,14 @@ def length_estimate(
     equations = _equations(design, x)
     unknowns = _start(design, x)
     directions = _open_directions(equations, unknowns)
-    everything = np.arange(len(unknowns.values))
+    everything = np.arange(len(unknowns))
     pivoted = equations.pivot >= 0
     if estimator == "sphere-then-metric" and pivoted.any():
         of_spheres = np.unique(equations.free[pivoted])
         unknowns, _, _, _ = _solved(equations.gauges(), unknowns, everything[6:])
         # Lengths of bars belong to the second step.
         bars = np.setdiff1d(np.arange(len(design.unknown_lengths.names)), of_spheres)
-        second = np.concatenate([everything[:6], 6 + 3 * len(unknowns.pivots) + bars])
+        second = np.concatenate([everything[:6], 6 + 3 * equations.pivots + bars])
         estimate, root, iterations, converged = _solved(equations, unknowns, second)
     else:
         estimate, root, iterations, converged = _solved(equations, unknowns, everything, directions)
@@ -113,8 +113,8 @@ def length_estimate(
     used = root.shape[1]
     freedom = len(residual) - used
     scatter = float(np.sqrt(residual @ residual / freedom)) if freedom > 0 else np.nan
-    factors = estimate.values[:6]
-    lengths = estimate.values[6 + 3 * len(estimate.pivots) :]
+    factors = estimate[:6]
+    lengths = estimate[6 + 3 * equations.pivots :]
     try:
         parameters = parameters_of_metric(_tensor(factors))
         if equations.all_free:
@@ -127,9 +127,9 @@ def length_estimate(
         raise NotAMetricError(str(error)) from None
     by_factor = _by_factor()
     is_open = (np.abs(directions) > 1e-7 * np.abs(directions).max(initial=0.0)).any(axis=1)
-    end = 6 + 3 * len(estimate.pivots)
+    end = 6 + 3 * equations.pivots
     open_centres = np.zeros(design.positions.origins.shape, bool)
-    open_centres[estimate.pivots] = is_open[6:end].reshape(-1, 3)
+    open_centres[design.gauge_positions] = is_open[6:end].reshape(-1, 3)
     spread = scatter * by_factor @ root[:6] if freedom > 0 else np.full((6, 1), np.nan)
     return LengthSolution(
         estimator,
@@ -158,7 +158,7 @@ class _Equations:
 
     `direction` (m, 3) is the design's. `known` (m,) are lengths in metres, `free` (m,) numbers of
     unknown ones, -1 for a known length. Each group in `together`, rows and a root (m, r), gives r
-    rows.
+    rows. Unknowns (n,) are e1 to e6, the centres of so many `pivots`, unknown lengths.
     """
 
     place: Array
@@ -167,6 +167,7 @@ class _Equations:
     known: Array
     free: np.ndarray
     together: tuple[tuple[np.ndarray, Array], ...] = ()
+    pivots: int = 0
 
     def gauges(self) -> _Equations:
         """The equations of Bryan gauges, whose lengths share no readings."""
@@ -177,6 +178,7 @@ class _Equations:
             self.pivot[chosen],
             self.known[chosen],
             self.free[chosen],
+            pivots=self.pivots,
         )
 
     def reduced(self, rows: Array) -> Array:
@@ -196,14 +198,6 @@ class _Equations:
         return bool((self.free >= 0).all())
 
 
-@dataclass(frozen=True)
-class _Unknowns:
-    """e1 to e6, centres of `pivots` (positions), unknown lengths: values (n,)."""
-
-    values: Array
-    pivots: np.ndarray
-
-
 def _equations(design: Design, x: Array) -> _Equations:
     lengths = design.of(Lengths)
     places_seen = x + design.probes.offsets[design.readings.probe]
@@ -214,21 +208,26 @@ def _equations(design: Design, x: Array) -> _Equations:
     number[design.gauge_positions] = np.arange(len(design.gauge_positions))
     free = np.full(len(lengths), -1) if lengths.free is None else lengths.free
     pivot = np.where(lengths.to_pivot, number[position], -1)
-    groups = [
-        group.rows for joint in design.once(length_whitening).joint for group in joint.together
-    ]
+    groups = [rows for joint in design.once(length_whitening).joint for rows, *_ in joint.together]
     together = tuple((rows, equation_root(lengths, rows)) for rows in groups)
-    return _Equations(place, lengths.direction, pivot, lengths.value, free, together)
+    return _Equations(
+        place,
+        lengths.direction,
+        pivot,
+        lengths.value,
+        free,
+        together,
+        len(design.gauge_positions),
+    )
 
 
-def _start(design: Design, x: Array) -> _Unknowns:
+def _start(design: Design, x: Array) -> Array:
     """The centres and lengths that a sphere through the readings has, on a machine without
     errors.
     """
     state = initial_state(design, x)
-    pivots = design.gauge_positions
-    values = np.concatenate([np.zeros(6), state.origins[pivots].ravel(), state.lengths])
-    return _Unknowns(values, pivots)
+    centres = state.origins[design.gauge_positions]
+    return np.concatenate([np.zeros(6), centres.ravel(), state.lengths])
 
 
 def _tensor(factors: Array) -> Array:
@@ -243,41 +242,41 @@ def _factors(metric: Array) -> Array:
     return np.array([metric[i, j] - (i == j) for i, j in PLACES])
 
 
-def _differences(equations: _Equations, unknowns: _Unknowns) -> tuple[Array, Array]:
+def _differences(equations: _Equations, unknowns: Array) -> tuple[Array, Array]:
     """D (m, 3) and the lengths (m,) to be compared with."""
     pivoted, free = np.flatnonzero(equations.pivot >= 0), np.flatnonzero(equations.free >= 0)
-    k = len(unknowns.pivots)
+    k = equations.pivots
     difference, length = equations.place.copy(), equations.known.copy()
-    difference[pivoted] -= unknowns.values[6 : 6 + 3 * k].reshape(k, 3)[equations.pivot[pivoted]]
-    length[free] = unknowns.values[6 + 3 * k :][equations.free[free]]
+    difference[pivoted] -= unknowns[6 : 6 + 3 * k].reshape(k, 3)[equations.pivot[pivoted]]
+    length[free] = unknowns[6 + 3 * k :][equations.free[free]]
     return difference, length
 
 
-def _rows(equations: _Equations, unknowns: _Unknowns) -> tuple[Array, Array]:
+def _rows(equations: _Equations, unknowns: Array) -> tuple[Array, Array]:
     """D' G D - d^2 (r,) and its derivative by all unknowns (r, n), reduced to uncorrelated
     equations.
     """
     difference, length = _differences(equations, unknowns)
-    pulled = difference @ _tensor(unknowns.values[:6])
+    pulled = difference @ _tensor(unknowns[:6])
     residual = (pulled * difference).sum(axis=1) - length**2
     derivative = _derivative(equations, unknowns, difference, pulled, length)
     return equations.reduced(residual), equations.reduced(derivative)
 
 
 def _derivative(
-    equations: _Equations, unknowns: _Unknowns, difference: Array, pulled: Array, length: Array
+    equations: _Equations, unknowns: Array, difference: Array, pulled: Array, length: Array
 ) -> Array:
     pivoted, free = np.flatnonzero(equations.pivot >= 0), np.flatnonzero(equations.free >= 0)
-    rows = np.zeros((len(length), len(unknowns.values)))
+    rows = np.zeros((len(length), len(unknowns)))
     for column, (i, j) in enumerate(PLACES):
         rows[:, column] = (1.0 if i == j else 2.0) * difference[:, i] * difference[:, j]
     for axis in range(3):
         rows[pivoted, 6 + 3 * equations.pivot[pivoted] + axis] = -2.0 * pulled[pivoted, axis]
-    rows[free, 6 + 3 * len(unknowns.pivots) + equations.free[free]] = -2.0 * length[free]
+    rows[free, 6 + 3 * equations.pivots + equations.free[free]] = -2.0 * length[free]
     return rows
 
 
-def _open_directions(equations: _Equations, unknowns: _Unknowns) -> Array:
+def _open_directions(equations: _Equations, unknowns: Array) -> Array:
     """Return orthonormal undetermined directions (n, k) of the equations, in micrometres and parts
     per million.
 
@@ -294,10 +293,10 @@ def _open_directions(equations: _Equations, unknowns: _Unknowns) -> Array:
 
 def _solved(
     equations: _Equations,
-    start: _Unknowns,
+    start: Array,
     columns: np.ndarray,
     held_directions: Array | None = None,
-) -> tuple[_Unknowns, Array, int, bool]:
+) -> tuple[Array, Array, int, bool]:
     """Return least-squares values of some unknowns, a square root (n, rank) of (J'J)^+, and the
     iterations.
     """
@@ -309,10 +308,10 @@ def _solved(
             used = used - (used @ held_directions) @ held_directions.T
         u, values, vh = svd(used, full_matrices=False)
         rank = int((values > EXACT * values.max(initial=0.0)).sum())
-        root = np.zeros((len(unknowns.values), rank))
+        root = np.zeros((len(unknowns), rank))
         root[columns] = MICROMETRE * vh[:rank].T / values[:rank]
         step = -root @ (u[:, :rank].T @ residual)
-        unknowns = _Unknowns(unknowns.values + step, unknowns.pivots)
+        unknowns = unknowns + step
         size = float(np.abs(step).max(initial=0.0))
         if not np.isfinite(size):
             break
@@ -334,7 +333,8 @@ def _by_factor() -> Array:
     return derivative
 
 
-def _centres(design: Design, unknowns: _Unknowns) -> Array:
+def _centres(design: Design, unknowns: Array) -> Array:
     centres = np.full(design.positions.origins.shape, np.nan)
-    centres[unknowns.pivots] = unknowns.values[6 : 6 + 3 * len(unknowns.pivots)].reshape(-1, 3)
+    pivots = design.gauge_positions
+    centres[pivots] = unknowns[6 : 6 + 3 * len(pivots)].reshape(-1, 3)
     return centres

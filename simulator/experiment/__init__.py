@@ -10,14 +10,21 @@ from ballplate.simulator.inputs.faces import lazily
 if TYPE_CHECKING:
     from .changes import node_of
     from .error_tables import parse_line, parse_point
-    from .exact_values import exact_contradictions
     from .json_schema import DRAFT, schema, tidied
     from .layout import lay_out
     from .loading import build, load, trees_of, with_pool
     from .machine_file import load_machine
-    from .map_files import is_map_file, read_map, write_map
-    from .model import Candidate, ChangeTimes, Experiment, Pool, Position, Probe, ReadingGroup
-    from .model_files import absolute
+    from .map_files import is_map_file, read_map
+    from .model import (
+        AtMost,
+        Candidate,
+        ChangeTimes,
+        Experiment,
+        Pool,
+        Position,
+        Probe,
+        ReadingGroup,
+    )
     from .modules import python_models, runs_code
     from .name_rules import PLACE, check_rule
     from .named_files import (
@@ -40,14 +47,12 @@ if TYPE_CHECKING:
     )
     from .sections import Line, Seed
     from .spans import unspanned
-    from .star_tables import doubt_of_table
     from .variants import (
         is_same_place,
         node_at,
         override,
         place_of,
         variant_trees,
-        with_present_keys,
     )
 
 __getattr__, __dir__ = lazily(__name__, __file__)

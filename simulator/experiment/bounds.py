@@ -16,7 +16,7 @@ from ..inputs.messages import Steps
 from ..inputs.number_arrays import Array
 from ..inputs.settings import hint
 from .model import Probe
-from .pool_sections import LimitsSettings, RegionSettings
+from .pool_sections import LimitsSettings, Region
 from .structure import Sections
 
 TOLERANCE = 1e-9
@@ -149,7 +149,7 @@ def _forbidden(limits: LimitsSettings, references: References) -> Array:
         steps, before = ("pool", "limits", "forbidden", k), len(references.problems.messages)
         ends = _ends(region, steps, references)
         text = "has no limits; give the ends of the box along at least one axis"
-        references.require(bool(region.stated), steps, text)
+        references.require(bool(region), steps, text)
         is_faulty = len(references.problems.messages) > before
         # Nothing enters a box that begins at infinity.
         boxes.append(np.full((2, d), np.inf) if is_faulty else ends)
@@ -165,10 +165,10 @@ def _through_walls(boxes: Array, volume: Volume) -> Array:
     return frozen(np.stack([lower, upper], axis=1))
 
 
-def _ends(region: RegionSettings, steps: Steps, references: References) -> Array:
+def _ends(region: Region, steps: Steps, references: References) -> Array:
     """Lower and upper ends (2, d) of a region, infinite where it is not limited."""
     ends = np.array([[-np.inf] * 3, [np.inf] * 3])
-    for axis, axis_lengths in region.stated.items():
+    for axis, axis_lengths in region.items():
         k = AXIS_INDEX[axis]
         if axis_lengths[0] >= axis_lengths[1]:
             text = "the lower end must be below the upper; correct them"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..design.lookup import References
+from ..design.lookup import Indices, References
 from ..design.objects import SLIGHTLY, Machine, Volume
 from ..design.observations.calibration import Calibration
 from ..design.observations.distances import DistanceCalibration
@@ -41,6 +41,7 @@ from ..machines.true_machine_settings import (
 from ..machines.truth import TruthError, true_machine
 from .model import Evaluation, Position, Probe
 from .structure import Sections
+from .volumes import check_within
 
 if TYPE_CHECKING:
     from ..machines.description import MachineDescription
@@ -149,18 +150,8 @@ def _true_machine_of_file(
         )
         text = f"is outside the file's volume ({ends} in z); stay within it"
         references.problems.add(("true_machine", "level"), text)
-    for axis, name in enumerate(AXES[: machine.dimension]):
-        low, high = machine.volume.lower[axis], machine.volume.upper[axis]
-        if (
-            low < true_machine.lower[axis] - TOLERANCE
-            or high > true_machine.upper[axis] + TOLERANCE
-        ):
-            text = (
-                f"its volume is {format_length(true_machine.lower[axis])} to"
-                f" {format_length(true_machine.upper[axis])} in {name}, but machine.volume is"
-                f" {format_length(low)} to {format_length(high)}; stay within it"
-            )
-            references.problems.add(steps, text)
+    d = machine.dimension
+    check_within(true_machine.lower[:d], true_machine.upper[:d], machine, steps, references)
 
 
 def check_true_machine(sections: Sections, machine: Machine | None, references: References) -> None:
@@ -456,9 +447,10 @@ def check_radii(calibrations: Mapping[int, Calibration], problems: Problems) -> 
 def check_size(
     sections: Sections,
     machine: Machine | None,
-    positions: dict[int, Position],
+    positions: Mapping[int, Position],
     calibrations: Mapping[int, Calibration],
     probes: Mapping[str, Probe],
+    evaluation: Evaluation | None,
     references: References,
 ) -> None:
     """Report what would take more memory than a computer usually has, or hours."""
@@ -466,53 +458,34 @@ def check_size(
     if settings is None or machine is None or problems.has_below(("error_model",)):
         return
     d = machine.dimension
-    poses = sum(
-        references.artefacts[position.artefact].role == "plate" for position in positions.values()
-    )
+    plates = [
+        position
+        for position in positions.values()
+        if references.artefacts[position.artefact].role == "plate"
+    ]
     pivots = _pivots(positions.values(), references)
     errors = len(build_error_model(settings, *machine.volume.corners).parameters)
     offsets = sum(probe.is_estimated for probe in probes.values())
-    shared = errors + pose_size(d) * poses + d * (len(pivots) + offsets)
+    shared = errors + pose_size(d) * len(plates) + d * (len(pivots) + offsets)
     if shared > MOST_SHARED:
         text = (
-            f"{poses + len(pivots)} poses, {errors} machine errors and {offsets} probe offsets"
-            f" make {shared} parameters in addition to the balls; at most {MOST_SHARED} are"
+            f"{len(plates) + len(pivots)} poses, {errors} machine errors and {offsets} probe"
+            f" offsets make {shared} parameters in addition to the balls; at most {MOST_SHARED} are"
             " possible: leave positions out, or give the machine fewer coefficients"
         )
         problems.add(("positions",), text, of_key=True)
+    points = 0 if evaluation is None else len(evaluation.points)
+    if points * d * errors > MOST_DERIVATIVES:
+        text = (
+            f"{points} points with {errors} machine errors have {points * d * errors} derivatives;"
+            f" at most {MOST_DERIVATIVES // (d * errors)} points are possible with these errors"
+        )
+        problems.add(("evaluation", "points"), text)
     check_lengths(
         {("calibration", i): position for i, position in calibrations.items()},
         positions.values(),
         references,
     )
-
-
-def check_derivatives(
-    sections: Sections,
-    machine: Machine | None,
-    evaluation: Evaluation | None,
-    references: References,
-) -> None:
-    """Report evaluation points whose derivatives by all machine errors exceed the memory."""
-    settings = sections.get("error_model")
-    if (
-        settings is None
-        or machine is None
-        or evaluation is None
-        or references.problems.has_below(("error_model",))
-    ):
-        return
-    count, d = evaluation.points.shape
-    # Errors are at most as many as parameters are, so that they need seldom be counted.
-    if count * d * MOST_SHARED <= MOST_DERIVATIVES:
-        return
-    errors = len(build_error_model(settings, *machine.volume.corners).parameters)
-    if count * d * errors > MOST_DERIVATIVES:
-        text = (
-            f"{count} points with {errors} machine errors have {count * d * errors} derivatives;"
-            f" at most {MOST_DERIVATIVES // (d * errors)} points are possible with these errors"
-        )
-        references.problems.add(("evaluation", "points"), text)
 
 
 def _pivots(positions: Iterable[Position], references: References) -> list[Position]:
@@ -530,50 +503,37 @@ def check_lengths(
     positions: Collection[Position],
     references: References,
 ) -> None:
-    """Report length standards and gauges that are read too often."""
+    """Report length standards and gauges that are read too often, and standards with too many
+    lengths that have balls in common.
+    """
     problems = references.problems
     rows = sum(pivot.count for pivot in _pivots(positions, references))
     if rows > MOST_LENGTHS:
         text = f"Bryan gauges are read {rows} times; at most {MOST_LENGTHS} lengths are possible"
         problems.add(("positions",), text, of_key=True)
+    joint: dict[str, list[Indices]] = {}
     for steps, calibration in calibrations.items():
-        name = calibration.artefact
+        name, place = calibration.artefact, (*steps, "pairs")
         if not isinstance(calibration, DistanceCalibration):
             continue
-        if references.artefacts[name].role == "length_standard":
-            times = sum(len(position.probes) for position in positions if position.artefact == name)
-            if len(calibration.pairs) * times > MOST_LENGTHS:
-                text = (
-                    f'{len(calibration.pairs)} distances of "{name}", read {times} times, are too'
-                    f" many; at most {MOST_LENGTHS} lengths are possible"
-                )
-                problems.add((*steps, "pairs"), text)
-    _check_joint_lengths(calibrations, references)
-
-
-def _check_joint_lengths(calibrations: Mapping[Steps, Calibration], references: References) -> None:
-    """Report length standards with too many lengths that have balls in common."""
-    of_standards: dict[str, list[tuple[Steps, DistanceCalibration]]] = {}
-    for steps, calibration in calibrations.items():
-        if (
-            not isinstance(calibration, DistanceCalibration)
-            or calibration.repeatability != "included"
-        ):
+        if references.artefacts[name].role != "length_standard":
             continue
-        if references.artefacts[calibration.artefact].role == "length_standard":
-            of_standards.setdefault(calibration.artefact, []).append((steps, calibration))
-    for name, calibrations_of_standard in of_standards.items():
-        ends = np.concatenate(
-            [calibration.pairs.ravel() for _, calibration in calibrations_of_standard]
-        )
-        place = (*calibrations_of_standard[-1][0], "pairs")
-        is_joint = len(ends) > 2 * MOST_JOINT_LENGTHS and np.bincount(ends).max() > 1
-        if is_joint and not references.problems.has_below(place):
+        times = sum(len(position.probes) for position in positions if position.artefact == name)
+        if len(calibration.pairs) * times > MOST_LENGTHS:
             text = (
-                f'{len(ends) // 2} distances of "{name}" have balls in common; at most'
-                f" {MOST_JOINT_LENGTHS} such are possible: calibrate fewer of them"
+                f'{len(calibration.pairs)} distances of "{name}", read {times} times, are too'
+                f" many; at most {MOST_LENGTHS} lengths are possible"
             )
-            references.problems.add(place, text)
+            problems.add(place, text)
+        elif calibration.repeatability == "included":
+            joint.setdefault(name, []).append(calibration.pairs.ravel())
+            ends = np.concatenate(joint[name])
+            if len(ends) > 2 * MOST_JOINT_LENGTHS and np.bincount(ends).max() > 1:
+                text = (
+                    f'{len(ends) // 2} distances of "{name}" have balls in common; at most'
+                    f" {MOST_JOINT_LENGTHS} such are possible: calibrate fewer of them"
+                )
+                problems.add(place, text)
 
 
 def check_points(

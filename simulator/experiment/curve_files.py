@@ -4,98 +4,71 @@ names.
 
 from __future__ import annotations
 
-from fractions import Fraction
+from itertools import compress
 from pathlib import Path
 
 import numpy as np
 
-from ..inputs.messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message, refused
+from ..inputs.messages import refused
 from ..inputs.quantities import ANGLE_UNITS, LENGTH_UNITS
-from ..inputs.settings import hint, listing, shorten
-from ..inputs.tables import (
-    TableLine,
-    decimal_sign,
-    header_cells,
-    read_number,
-    table_lines,
-    wrong_count,
-)
-from ..inputs.yamltree import Mark
+from ..inputs.settings import listing
+from ..inputs.tables import read_table, table_lines
 from ..machines.curves import NAMES, Points
-from ..machines.error_names import AXIS_ERRORS, TRANSLATIONS
+from ..machines.error_names import AXIS_ERRORS, TRANSLATIONS, AxisError
 from ..machines.protocol import Array, Integers
 
 POSITION = "position"
 EXAMPLE = "position_mm,EXX_um,EYX_um,EAX_urad"
 BANDWIDTH = "_bandwidth"
+# Units of errors, the usual ones first.
+LENGTHS = {"um": LENGTH_UNITS["um"], **LENGTH_UNITS}
+ANGLES = {"urad": ANGLE_UNITS["urad"], **ANGLE_UNITS}
 # Far more than are measured along an axis.
-MOST_POINTS = 100_000
+MOST_POINTS = 20_000
 # Of the smallest step of a run: what a machine misses a target by is far less, and no curve's
 # shape is lost between positions so near.
 SAME_TARGET = 1 / 200
 
 
-def read_curves(path: Path) -> dict[str, Points]:
-    """Read curves of one axis from a file whose first line names the columns, such as
-    position_mm,EXX_um,EAX_urad.
-
-    :raises ExperimentError: all faults of the file at once.
-    """
-    return read_numbered_curves(path)[0]
-
-
 def read_numbered_curves(
     path: Path, bandwidths: bool = False
 ) -> tuple[dict[str, Points], tuple[int, ...], str]:
-    """The same with the number of each point's line, and a note on means; with `bandwidths` columns
-    such as EXX_bandwidth_um are curves too.
+    """Read curves of one axis from a file whose first line names the columns, such as
+    position_mm,EXX_um,EAX_urad; return them with the number of each point's line, and a note on
+    means. With `bandwidths` columns such as EXX_bandwidth_um are curves too.
 
     Target positions that occur several times, as in runs there and back, have the mean of both
     directions, in position too: runs meet a target within `SAME_TARGET` of their smallest step.
 
-    :raises ExperimentError: as `read_curves`.
+    :raises ExperimentError: all faults of the file at once.
     """
-    file = str(path)
-    lines = table_lines(path)
-    if not lines:
-        raise refused(file, f"the file is empty; its first line should be {EXAMPLE}")
+    file, lines = str(path), table_lines(path)
     if len(lines) > MOST_POINTS + 1:
         text = (
             f"{len(lines) - 1} points are too many; at most {MOST_POINTS} are possible: leave some"
             " of them out"
         )
         raise refused(file, text, line=lines[0].number)
-    names_known = (*NAMES, *(f"{name}{BANDWIDTH}" for name in NAMES)) if bandwidths else NAMES
-    names, factors = _columns(file, lines[0], names_known)
-    decimal = decimal_sign(lines[1:], range(len(names)))
-    messages: list[Message] = []
-    rows = []
-    for line in lines[1:]:
-        number = line.number
-        if len(messages) >= MOST_MESSAGES:
-            messages.append(Message(file, number, 1, "", MORE_ERRORS))
-            break
-        cells = line.cells()
-        if cells is None or len(cells) != len(names):
-            messages.append(Message(file, number, 1, "", wrong_count(line, cells, len(names))))
-            continue
-        row = [
-            read_number(cell, name, factor, Mark(file, number, column), messages, decimal=decimal)
-            for (column, cell), name, factor in zip(cells, names, factors, strict=True)
-        ]
-        rows.append((number, row))
-    if messages:
-        raise ExperimentError(messages)
-    table = np.array([row for _, row in rows]).reshape(-1, len(names))
-    column = names.index(POSITION)
-    targets = _targets(table[:, column])
+    errors = (*NAMES, *(f"{name}{BANDWIDTH}" for name in NAMES)) if bandwidths else NAMES
+    units = {name: ANGLES if _error(name).is_rotation else LENGTHS for name in errors}
+    rows = read_table(path, (), (POSITION,), errors, absent=np.nan, units=units)
+    table = np.array([row.lengths for row in rows])
+    is_there = ~np.isnan(table).all(axis=0)
+    table, names = table[:, is_there], [*compress((POSITION, *errors), is_there)]
+    axes = sorted({TRANSLATIONS[_error(name).axis] for name in names[1:]})
+    if len(axes) != 1:
+        text = f"errors of the axes {listing(axes)}; write one file for each axis"
+        if not axes:
+            text = f"has no error; write columns as in {EXAMPLE}"
+        raise refused(file, text, line=lines[0].number)
+    targets = _targets(table[:, 0])
     positions, first, index = np.unique(targets, return_index=True, return_inverse=True)
     if len(positions) < 2:
         raise refused(file, "a curve needs at least two points; add rows", line=lines[0].number)
     # Equal positions stay exactly what they are.
-    table[:, column] -= targets
+    table[:, 0] -= targets
     means, reversal, one_way = _means(targets, index, table)
-    points = tuple((positions + means[:, column]).tolist())
+    points = tuple((positions + means[:, 0]).tolist())
     curves = {
         name: Points(points, tuple(means[:, k].tolist()))
         for k, name in enumerate(names)
@@ -112,7 +85,7 @@ def read_numbered_curves(
         )
         if largest := listing(sizes):
             note += f"; largest reversal values, which the means leave out: {largest}"
-    return curves, tuple(rows[k][0] for k in first.tolist()), note
+    return curves, tuple(rows[k].mark.line for k in first.tolist()), note
 
 
 def _targets(x: Array) -> Array:
@@ -155,55 +128,5 @@ def _means(x: Array, index: Integers, table: Array) -> tuple[Array, Array, Array
     return means, np.fmax.reduce(abs(forwards - backwards)), one_way
 
 
-def _columns(
-    file: str, header: TableLine, errors: tuple[str, ...]
-) -> tuple[list[str], list[Fraction]]:
-    mark = Mark(file, header.number, 1)
-    messages = []
-    names = []
-    factors = []
-    for place, cell, name, unit in header_cells(file, header, EXAMPLE):
-        if name != POSITION and name not in errors:
-            is_known = cell in (POSITION, *errors)
-            remedy = (
-                f"write it with its unit, as in {EXAMPLE}"
-                if is_known
-                else hint(name or cell, [POSITION, *errors])
-            )
-            problem = "has no unit" if is_known else "is not an error of an axis"
-            messages.append(place.message("", f'the column "{shorten(cell)}" {problem}; {remedy}'))
-            continue
-        error = AXIS_ERRORS.get(name.removesuffix(BANDWIDTH))
-        is_angle = error is not None and error.is_rotation
-        units = ANGLE_UNITS if is_angle else LENGTH_UNITS
-        if unit not in units:
-            messages.append(
-                place.message(
-                    "", f'unknown unit in the column "{shorten(cell)}"; {hint(unit, units)}'
-                )
-            )
-            continue
-        if name in names:
-            messages.append(
-                place.message("", f'a second column "{shorten(cell)}"; remove one of them')
-            )
-        names.append(name)
-        factors.append(units[unit])
-    axes = sorted(
-        {
-            TRANSLATIONS[AXIS_ERRORS[name.removesuffix(BANDWIDTH)].axis]
-            for name in names
-            if name != POSITION
-        }
-    )
-    if not messages and (POSITION not in names or not axes):
-        messages.append(
-            mark.message("", f"has no position, or no error; write columns as in {EXAMPLE}")
-        )
-    if len(axes) > 1:
-        messages.append(
-            mark.message("", f"errors of the axes {listing(axes)}; write one file for each axis")
-        )
-    if messages:
-        raise ExperimentError(messages)
-    return names, factors
+def _error(name: str) -> AxisError:
+    return AXIS_ERRORS[name.removesuffix(BANDWIDTH)]

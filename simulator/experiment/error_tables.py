@@ -49,14 +49,10 @@ class ErrorTable:
     note: str = ""
 
 
-class LineError(ValueError):
-    """A text is no line or point."""
-
-
 def parse_line(text: str) -> dict[str, float]:
     """Read a line along an axis, given by positions of other axes.
 
-    :raises LineError: written otherwise.
+    :raises QuantityError: written otherwise.
 
     >>> parse_line("y = 600 mm, z = 0.2 m")
     {'y': 0.6, 'z': 0.2}
@@ -66,25 +62,25 @@ def parse_line(text: str) -> dict[str, float]:
     for part in text.split(","):
         name, equals, value = (piece.strip() for piece in part.partition("="))
         if not equals or name not in AXES:
-            raise LineError(
+            raise QuantityError(
                 f'"{shorten(part)}" is not a position of an axis; write for example y = 600 mm, z ='
                 " 200 mm"
             )
         if name in values:
-            raise LineError(f"{name} is given twice; give it once")
+            raise QuantityError(f"{name} is given twice; give it once")
         try:
             values[name] = parse_length(value)
         except QuantityError as error:
-            raise LineError(f"{name}: {error}") from None
+            raise QuantityError(f"{name}: {error}") from None
     if len(values) > 2:
-        raise LineError("a line needs an axis along which it runs; leave that one out")
+        raise QuantityError("a line needs an axis along which it runs; leave that one out")
     return values
 
 
 def _refuse_decimal_comma(text: str) -> None:
     comma = re.search("[0-9]+,[0-9]+", text)
     if comma is not None:
-        raise LineError(f'"{comma[0]}" has a decimal comma; write {comma[0].replace(",", ".")}')
+        raise QuantityError(f'"{comma[0]}" has a decimal comma; write {comma[0].replace(",", ".")}')
 
 
 # In one piece: everything that is wrong with a file is collected before any of it is refused.
@@ -125,7 +121,7 @@ def read_error_table(path: Path, name: str, axis: tuple[float, float] | None = N
     for key, (mark, text) in stated_values.items():
         try:
             values[key] = KEYS[key](text)
-        except LineError as error:
+        except QuantityError as error:
             messages.append(mark.message("", str(error)))
     line_of, along = values.get("line", {}), AXES[AXIS_ERRORS[name].axis]
     if along in line_of:
@@ -208,7 +204,7 @@ def _range(
 def parse_point(text: str) -> Three:
     """Read three co-ordinates.
 
-    :raises LineError: written otherwise.
+    :raises QuantityError: written otherwise.
 
     >>> parse_point("0 mm, 0.5 m, -100 mm")
     (0.0, 0.5, -0.1)
@@ -216,24 +212,23 @@ def parse_point(text: str) -> Three:
     parts = text.strip().strip("[]").split(",")
     if len(parts) != 3:
         _refuse_decimal_comma(text)
-        raise LineError(f"has {len(parts)} co-ordinates; give three, such as 0 mm, 0 mm, -100 mm")
-    try:
-        x, y, z = (parse_length(part.strip()) for part in parts)
-    except QuantityError as error:
-        raise LineError(str(error)) from None
+        raise QuantityError(
+            f"has {len(parts)} co-ordinates; give three, such as 0 mm, 0 mm, -100 mm"
+        )
+    x, y, z = (parse_length(part.strip()) for part in parts)
     return x, y, z
 
 
 def _criterion(text: str) -> str:
     if text not in get_args(Criterion):
         advice = hint(text, get_args(Criterion))
-        raise LineError(f'unknown criterion "{shorten(text)}"; {advice}')
+        raise QuantityError(f'unknown criterion "{shorten(text)}"; {advice}')
     return text
 
 
 def _table(text: str) -> bool:
     if text != "table":
-        raise LineError(f'unknown place "{shorten(text)}"; write table, or leave the line out')
+        raise QuantityError(f'unknown place "{shorten(text)}"; write table, or leave the line out')
     return True
 
 

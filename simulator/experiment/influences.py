@@ -76,10 +76,8 @@ def with_influences(design: Design, experiment: Experiment, is_pool: bool = Fals
     state = nominal_state(disturbed)
     x = locations(disturbed, state, chosen) - state.probes[chosen.probe]
     at = disturbed_readings(state, chosen, x)
-    for i, parameter in enumerate(experiment.influences):
-        text = wrong_of_shifts(
-            influences[i], parameter, at, lambda own_settings: own_settings.influence(parts)
-        )
+    for i, influence in enumerate(influences):
+        text = wrong_of_shifts(influence, at)
         if text:
             raise _of_class(experiment, i, text)
     parameters = disturbed.influence_parameters

@@ -22,7 +22,6 @@ from .calibrations import resolve_calibration
 from .changes import node_of
 from .checks import (
     check_calibration_read,
-    check_derivatives,
     check_error_model,
     check_inside,
     check_names,
@@ -31,7 +30,6 @@ from .checks import (
     check_true_machine,
     check_use,
 )
-from .exact_values import check_exact_values
 from .influences import resolve_influences
 from .machine import resolve_evaluation, resolve_machine, resolve_noise, target_of
 from .model import Evaluation, Experiment
@@ -46,7 +44,7 @@ from .readings_section import no_settings
 from .references import resolve_references
 from .spans import unspanned
 from .structure import validate_sections
-from .variants import MOST_OF_ALL, in_variants, variant_trees, with_present_keys
+from .variants import MOST_OF_ALL, in_variants, variant_trees
 
 
 def load(
@@ -125,7 +123,7 @@ def trees_of(
 
     :raises ExperimentError: the YAML has no tree.
     """
-    root = with_present_keys(parse_tree(text, str(source), refused))
+    root = parse_tree(text, str(source), refused)
     problems = Problems(root)
     return root, variant_trees(root, problems), problems
 
@@ -150,7 +148,7 @@ def written_in_python(sections: AnyMapping[str, Any], folder: Path) -> Experimen
         text = "are for files; change an experiment with its method with_()"
         raise mark.refused(text, "variants")
     try:
-        tree = with_present_keys(node_of(sections, mark))
+        tree = node_of(sections, mark)
     except ValueError as error:
         raise mark.refused(str(error)) from None
     return _built(tree, folder / "experiment", None, OPENED, False)
@@ -236,14 +234,12 @@ def _build(
                 calibration, ("calibration", i), readers, reader_count, references
             )
     check_radii(calibrations, problems)
-    check_exact_values(calibrations, references)
     pool = resolve_pool(sections, candidates, calibrations, references)
     priors = resolve_priors(sections, machine, named, probes, references)
     influences = resolve_influences(sections, named, references)
-    check_size(sections, machine, enabled, calibrations, probes, references)
     noise = resolve_noise(sections.get("noise"), problems)
     evaluation = resolve_evaluation(sections, machine, probes, references)
-    check_derivatives(sections, machine, evaluation, references)
+    check_size(sections, machine, enabled, calibrations, probes, evaluation, references)
     check_readings(sections, references)
     stars = resolve_stars(sections, probes, references)
     own_sections = resolve_own_sections(sections, references)

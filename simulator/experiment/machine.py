@@ -23,6 +23,7 @@ from .checks import TOLERANCE, check_points
 from .model import Evaluation, Probe, Task
 from .sections import MOST_POINTS, MachineSettings, PointsSettings, TaskSettings
 from .structure import Sections
+from .volumes import check_ends
 
 AXES = ("x", "y", "z")
 
@@ -37,15 +38,7 @@ def resolve_machine(settings: MachineSettings, problems: Problems) -> Machine | 
         ends = {axis: (0.0, edge) for axis, edge in zip(AXES, settings.volume, strict=False)}
     else:
         ends = settings.volume.stated
-    is_right = True
-    for axis, (lower, upper) in ends.items():
-        if upper <= lower:
-            text = (
-                f"ends at {format_length(upper)}, not above its beginning, {format_length(lower)}; "
-                "exchange or correct them"
-            )
-            problems.add(("machine", "volume", axis), text)
-            is_right = False
+    is_right = check_ends(ends, ("machine", "volume"), problems)
     steps = ("machine", "repeatability")
     by_axis: dict[str, float]
     if isinstance(settings.repeatability, float):

@@ -21,7 +21,7 @@ from ..inputs.validation import validated
 from ..inputs.yamltree import Mapping, Scalar, read_tree, to_python
 from ..machines.arrangement import AXES
 from ..machines.arrangement_settings import arrangement_of
-from ..machines.curves import NAMES, Points, SmoothedPoints
+from ..machines.curves import NAMES, Points
 from ..machines.description import (
     AxisTemperature,
     MachineDescription,
@@ -36,6 +36,7 @@ from ..splines.spline_problems import SplineError, SplineProblem
 from .error_tables import ErrorTable, read_error_table
 from .machine_sections import DescribedMachineSettings, SmoothingSettings
 from .sections import VolumeSettings
+from .volumes import check_ends
 
 # Part of a polynomial's coefficients that is rounding.
 NOTHING = 1e-12
@@ -116,7 +117,7 @@ def _bare(settings: DescribedMachineSettings, problems: Problems) -> MachineDesc
             problems.add(("volume", "z"), "missing; a machine file has three axes")
             return None
         ends = [volume.x, volume.y, volume.z]
-    _check_ends(ends, problems)
+    check_ends(dict(zip(AXES, ends, strict=True)), ("volume",), problems)
     # What else is wrong is told with the ends exchanged, or without any.
     ends = [
         (min(pair), max(pair)) if pair[0] != pair[1] else (-math.inf, math.inf) for pair in ends
@@ -130,13 +131,11 @@ def _bare(settings: DescribedMachineSettings, problems: Problems) -> MachineDesc
         )
         problems.add(("droop",), text, of_key=True)
     bottom, top = (_three(end) for end in zip(*ends, strict=True))
-    temperature = {
+    temperature: dict[str, AxisTemperature] = {
         axis: AxisTemperature(
             excess.expansion, excess.deviation, excess.standard_uncertainty or 0.0
         )
-        for axis, excess in (
-            {} if settings.temperature is None else settings.temperature.stated
-        ).items()
+        for axis, excess in (settings.temperature or {}).items()
     }
     machine = MachineDescription(
         title=settings.title,
@@ -157,26 +156,13 @@ def _bare(settings: DescribedMachineSettings, problems: Problems) -> MachineDesc
     return replace(machine, reference=bottom)
 
 
-def _check_ends(ends: Iterable[tuple[float, float]], problems: Problems) -> None:
-    for axis, (lower, upper) in zip(AXES, ends, strict=False):
-        if upper < lower:
-            text = (
-                f"ends at {format_length(upper)}, not above its beginning, {format_length(lower)};"
-                " exchange them"
-            )
-            problems.add(("volume", axis), text)
-        elif upper == lower:
-            text = f"begins and ends at {format_length(lower)}; give an end above it"
-            problems.add(("volume", axis), text)
-
-
 def _volume_of(root: Mapping, problems: Problems) -> None:
     """Report faults of the volume of a file that has other faults."""
     try:
         volume = VolumeSettings.model_validate(to_python(root).get("volume"))
     except ValidationError:
         return
-    _check_ends([ends for ends in (volume.x, volume.y, volume.z) if ends is not None], problems)
+    check_ends(volume.stated, ("volume",), problems)
 
 
 def _three(values: Iterable[float]) -> Three:
@@ -244,7 +230,7 @@ def _smoothed(
     knots = tuple(sorted(settings.knots or ()))
     if settings.every is not None:
         knots = at_every(x, settings.every, float(x[0]), float(x[-1]))
-    smoothed = SmoothedPoints(points.positions, points.values, settings.order, knots)
+    smoothed = Points(points.positions, points.values, settings.order, knots)
     try:
         if len(x) < settings.order + len(knots):
             text = f"{len(x)} points do not determine {settings.order + len(knots)} coefficients"
@@ -318,11 +304,14 @@ def _read_tables(root: Mapping, source: Path, problems: Problems, trust: Trust) 
 
 
 def _line(
-    settings: Any, machine: MachineDescription, axis: int, steps: Steps, problems: Problems
+    values: dict[str, float] | None,
+    machine: MachineDescription,
+    axis: int,
+    steps: Steps,
+    problems: Problems,
 ) -> Three | None:
-    if settings is None:
+    if values is None:
         return None
-    values = settings.stated
     if AXES[axis] in values:
         problems.add(
             (*steps, AXES[axis]), f"the line runs along {AXES[axis]}; leave it out", of_key=True

@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, create_model, model_validator
 
+from ..geometry.positions import Axis
 from ..inputs.quantities import (
     Angle,
     Bending,
@@ -45,14 +46,6 @@ STRAIGHTEDGE = "table, if it was measured along a straightedge on a table that t
 STRAIGHTNESS = "reference line of straightness errors: end points, least squares or minimum zone"
 
 
-class LineSettings(Settings):
-    """A line along an axis, by the positions of the two other axes."""
-
-    x: Length | None = Field(None, description="position of the x axis")
-    y: Length | None = Field(None, description="position of the y axis")
-    z: Length | None = Field(None, description="position of the z axis")
-
-
 class SmoothingSettings(Settings):
     """A least-squares spline or polynomial instead of the points of a table."""
 
@@ -87,7 +80,7 @@ class _ErrorSettings(Settings):
         ),
     )
     sigmas: Sigmas = Field(2, description=SIGMAS)
-    line: LineSettings | None = Field(None, description=LINE)
+    line: dict[Axis, Length] | None = Field(None, description=LINE)
     probe: Point | None = Field(None, description=PROBE)
 
     @model_validator(mode="after")
@@ -198,14 +191,6 @@ class AxisTemperatureSettings(Settings):
     )
 
 
-class TemperatureSettings(Settings):
-    """Temperatures of the axes; those left out are at the reference temperature."""
-
-    x: AxisTemperatureSettings | None = Field(None, description="x axis")
-    y: AxisTemperatureSettings | None = Field(None, description="y axis")
-    z: AxisTemperatureSettings | None = Field(None, description="z axis")
-
-
 class DroopSettings(Settings):
     """Droop of a horizontal arm, for each metre that it is moved out; it counts besides the stated
     errors.
@@ -249,7 +234,10 @@ class DescribedMachineSettings(Settings):
     squareness: SquarenessSettings | None = Field(  # type: ignore[valid-type]
         None, description="squareness errors by ISO 230-1 name"
     )
-    temperature: TemperatureSettings | None = Field(None, description="temperatures of the axes")
+    temperature: dict[Axis, AxisTemperatureSettings] | None = Field(
+        None,
+        description="temperatures of the axes; those left out are at the reference temperature",
+    )
     droop: DroopSettings | None = Field(None, description="droop of the arm, for MH1 and MH2")
     probing: PositiveLength | None = Field(
         None, description="standard deviation that probing adds to each co-ordinate; default 0"

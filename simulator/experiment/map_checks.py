@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..computing.decompositions import eigvalsh
 from ..design.objects import Probes, Volume
 from ..inputs.messages import ExperimentError
 from ..inputs.problems import Problems
-from ..inputs.quantities import format_length
 from ..inputs.settings import describe, listing, shorten
 from ..inputs.trust import Trust
 from ..inputs.validation import validated
@@ -31,24 +27,15 @@ from ..machines.settings import (
 from ..maps.fit_verdict import LackOfFit
 from ..maps.fitted_map import FittedMap, LeftOut, MapData
 from .machine_file import load_machine
-from .map_content import AXES, checksum_of, corner_corrections
+from .map_content import AXES, checksum_of
 from .map_sections import MapSettings
 from .model_files import absolute, fingerprints
 from .own_sections import check_installed
-
-# Eigenvalues of a matrix of correlations that are no less than this times their number below zero
-# are so by rounding.
-NEGATIVE = 1e-10
-# Corrections of the same model, in metres, agree within this; and within this part of them.
-SAME, SAME_PART = 1e-12, 1e-9
-# Sums of squares agree with sigma within this part: another program may round both.
-SAME_SQUARES = 1e-3
+from .volumes import check_ends
 
 
 # In one piece: what is checked needs what was found right before it.
-def map_of_tree(
-    root: Node, arrays: Mapping[str, Array], source: Path, problems: Problems, trust: Trust
-) -> FittedMap | None:
+def map_of_tree(root: Node, source: Path, problems: Problems, trust: Trust) -> FittedMap | None:
     """The map of a tree, or None after reporting faults."""
     if not isinstance(root, MappingNode) or "map" not in root.items:
         description = (
@@ -70,11 +57,7 @@ def map_of_tree(
     if settings is None:
         return None
     ends = settings.volume.stated.values()
-    for axis, (low, high) in settings.volume.stated.items():
-        if low >= high:
-            text = f"ends at {format_length(high)}, not above its beginning, {format_length(low)}"
-            problems.add(("volume", axis), text)
-    if problems.messages:
+    if not check_ends(settings.volume.stated, ("volume",), problems):
         return None
     lower, upper = (np.array(end) for end in zip(*ends, strict=True))
     volume = Volume(lower, upper)
@@ -87,20 +70,15 @@ def map_of_tree(
     if problems.messages:
         return None
     size = len(values) + int(probes.free.sum())
-    covariance, undetermined = (
-        (arrays["covariance"], arrays["undetermined"])
-        if arrays
-        else (_triangle(settings, size, problems), _directions(settings, size, problems))
-    )
-    if not problems.messages:
-        _check_covariance(covariance, undetermined, size, problems)
-    if not problems.messages:
-        _check_unchanged(settings, root, model, values, volume, covariance, undetermined, problems)
-    if not problems.messages:
-        _check_squares(settings, problems)
+    covariance = _triangle(settings, size, problems)
+    undetermined = _directions(settings, size, problems)
+    if (np.diagonal(covariance) < 0.0).any():
+        problems.add(("covariance",), "has a variance below zero; write the map again")
+    elif not problems.messages:
+        _check_unchanged(settings.checksum, root, covariance, undetermined, problems)
     if problems.messages:
         return None
-    data, lack = settings.data, settings.lack_of_fit
+    data = settings.data
     return FittedMap(
         title=settings.title,
         model=model,
@@ -123,7 +101,7 @@ def map_of_tree(
         temperatures=settings.temperatures,
         left_out=tuple(LeftOut(**left_out.model_dump()) for left_out in settings.left_out),
         data=None if data is None else MapData(**data.model_dump()),
-        lack_of_fit=None if lack is None else LackOfFit(**lack.model_dump()),
+        lack_of_fit=LackOfFit(**settings.lack_of_fit.model_dump()),
         experiment=settings.experiment,
         program=settings.program,
         date=settings.date,
@@ -225,22 +203,6 @@ def _check_parameters(settings: MapSettings, model: ErrorModel, problems: Proble
             problems.add(("parameters", k), text)
 
 
-def _check_squares(settings: MapSettings, problems: Problems) -> None:
-    """Report sums of squares that an estimated sigma does not come from."""
-    if not settings.sigma.estimated:
-        return
-    for key, statement in (("sigma", settings.sigma), ("lack_of_fit", settings.lack_of_fit)):
-        if statement is None or statement.sum_of_squares is None:
-            continue
-        sum_of_squares = settings.sigma.value * settings.sigma.value * statement.degrees_of_freedom
-        if not math.isclose(statement.sum_of_squares, sum_of_squares, rel_tol=SAME_SQUARES):
-            text = (
-                f"contradicts sigma, whose square times {statement.degrees_of_freedom} degrees of"
-                f" freedom is {sum_of_squares:.6g}: the file was edited; write it again with fit -o"
-            )
-            problems.add((key, "sum_of_squares"), text)
-
-
 def _triangle(settings: MapSettings, size: int, problems: Problems) -> Array:
     """The covariance (size, size) of the rows of its lower triangle."""
     rows = settings.covariance
@@ -283,45 +245,19 @@ def _numbers(row: str | float, count: int, steps: tuple[str, int], problems: Pro
     return np.zeros(count)
 
 
-def _check_covariance(
-    covariance: Array, undetermined: Array, size: int, problems: Problems
-) -> None:
-    """Report an invalid covariance: of another size, not symmetric, with negative variances."""
-    if covariance.shape != (size, size) or undetermined.shape[:1] != (size,):
-        problems.add(("covariance",), f"is not of {size} parameters and estimated offsets")
-        return
-    if not (np.isfinite(covariance).all() and np.isfinite(undetermined).all()):
-        problems.add(("covariance",), "has entries that are no finite numbers")
-        return
-    spread = np.sqrt(np.abs(np.diagonal(covariance)))
-    spread = np.where(spread > 0.0, spread, 1.0)
-    least = float(eigvalsh(covariance / np.outer(spread, spread)).min())
-    if (covariance != covariance.T).any() or least < -NEGATIVE * size:
-        text = (
-            "is not that of any values: it is not symmetric, or some combination of them would have"
-            f" a variance below zero (eigenvalue {least:.3g} of the correlations); write the map"
-            " again"
-        )
-        problems.add(("covariance",), text)
-
-
 def _check_unchanged(
-    settings: MapSettings,
+    checksum: str | None,
     root: MappingNode,
-    model: ErrorModel,
-    values: Array,
-    volume: Volume,
     covariance: Array,
     undetermined: Array,
     problems: Problems,
 ) -> None:
-    """Report values that were edited, and a model that corrects otherwise than it did."""
+    """Report a file that was edited."""
     head = {
         key: value
         for key, value in to_python(root).items()
         if key not in ("covariance", "undetermined")
     }
-    checksum = settings.checksum
     if checksum is not None and checksum != checksum_of(head, covariance, undetermined):
         text = (
             "does not match the content of the file: it was edited or damaged since it was"
@@ -329,25 +265,3 @@ def _check_unchanged(
             " meant"
         )
         problems.add(("checksum",), text)
-        return
-    corrections = corner_corrections(model, values, volume)
-    if not settings.check:
-        return
-    count, d = corrections.shape
-    if len(settings.check) != count:
-        text = f"has {len(settings.check)} points instead of {count}; write the map again"
-        problems.add(("check",), text)
-    for k, row in enumerate(settings.check):
-        if len(row) != d:
-            problems.add(("check", k), f"{len(row)} numbers instead of {d}; write the map again")
-    if problems.messages:
-        return
-    stated_corrections = np.array(settings.check)
-    apart = np.abs(stated_corrections - corrections) > SAME + SAME_PART * np.abs(corrections)
-    if apart.any():
-        worst = float(np.abs(stated_corrections - corrections).max())
-        text = (
-            f"the error model with these values corrects by up to {format_length(worst)} otherwise"
-            " than when the map was written; it, or the values, have changed: fit again"
-        )
-        problems.add(("check",), text)

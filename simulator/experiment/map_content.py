@@ -10,11 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from ..design.objects import Volume
-from ..geometry.grids import even_grid
 from ..inputs.extensions import provider
 from ..inputs.yamltree import to_list
-from ..machines.protocol import Array, ErrorModel
+from ..machines.protocol import Array
 from ..machines.settings import KINDS
 from ..maps.fit_verdict import verdict_content
 from ..maps.fitted_map import FittedMap, MapData
@@ -49,12 +47,12 @@ def head_of(fitted: FittedMap, folder: Path) -> dict[str, Any]:
             "value": fitted.sigma,
             "estimated": fitted.sigma_is_estimated,
             "degrees_of_freedom": fitted.degrees_of_freedom,
-            **({} if fitted.sum_of_squares is None else {"sum_of_squares": fitted.sum_of_squares}),
+            "sum_of_squares": fitted.sum_of_squares,
         },
         "coverage_factor": fitted.coverage_factor,
         "temperatures": None if fitted.temperatures is None else dict(fitted.temperatures),
         "data": None if fitted.data is None else to_list(_data(fitted.data)),
-        "lack_of_fit": None if fitted.lack_of_fit is None else verdict_content(fitted.lack_of_fit),
+        "lack_of_fit": verdict_content(fitted.lack_of_fit),
         "left_out": [
             {key: value for key, value in vars(left_out).items() if value is not None}
             for left_out in fitted.left_out
@@ -63,7 +61,6 @@ def head_of(fitted: FittedMap, folder: Path) -> dict[str, Any]:
             {"name": value_of.name, "unit": value_of.unit, "value": value}
             for value_of, value in zip(fitted.model.parameters, fitted.values.tolist(), strict=True)
         ],
-        "check": corner_corrections(fitted.model, fitted.values, fitted.volume).tolist(),
     }
     head = {key: value for key, value in head.items() if value not in (None, {}, [], "")}
     head["checksum"] = checksum_of(head, fitted.covariance, fitted.undetermined)
@@ -107,14 +104,3 @@ def checksum_of(head: Mapping[str, Any], covariance: Array, undetermined: Array)
         digest.update(repr(array.shape).encode())
         digest.update(np.ascontiguousarray(array, "<f8").tobytes())
     return digest.hexdigest()
-
-
-def corner_corrections(model: ErrorModel, values: Array, volume: Volume) -> Array:
-    """Corrections (2^d + 1, d) at the corners and the centre, with a probe of a tenth of the
-    volume.
-    """
-    d = len(volume.lower)
-    corners = even_grid(np.zeros(d), np.ones(d), [2] * d)
-    points = volume.lower + volume.size * np.concatenate([corners, np.full((1, d), 0.5)])
-    offsets = np.broadcast_to(0.1 * volume.size, points.shape)
-    return np.asarray(model.error(points, values, offsets))

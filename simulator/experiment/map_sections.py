@@ -43,11 +43,10 @@ class MapSigmaSettings(Settings):
     degrees_of_freedom: Annotated[int, Field(ge=0)] = Field(
         description="observations less parameters that they determine"
     )
-    sum_of_squares: Annotated[float, Field(ge=0)] | None = Field(
-        None,
+    sum_of_squares: Annotated[float, Field(ge=0)] = Field(
         description=(
             "weighted sum of squares of the residuals at the stated uncertainties, with as many"
-            " degrees of freedom; left out of older maps"
+            " degrees of freedom"
         ),
     )
 
@@ -137,21 +136,12 @@ class MapSettings(Settings):
         None, description="temperatures in degrees Celsius: reference, scales, artefact"
     )
     data: MapDataSettings | None = Field(None, description="the readings that the map comes from")
-    lack_of_fit: LackOfFitSettings | None = Field(
-        None, description="residuals of the fit; left out: not stated, as in maps of old"
-    )
+    lack_of_fit: LackOfFitSettings = Field(description="residuals of the fit")
     left_out: tuple[LeftOutSettings, ...] = Field(
         (), description="estimates of the fit that the map does not apply"
     )
     parameters: NonEmpty[MapParameterSettings] = Field(
         description="parameters of the error model with their estimates, in its order"
-    )
-    check: tuple[tuple[float, ...], ...] = Field(
-        (),
-        description=(
-            "corrections in metres at the corners and the centre of the volume, with a probe"
-            " offset of a tenth of it, to recognise a model that has changed"
-        ),
     )
     undetermined: tuple[str | float | int, ...] = Field(
         (), description=f"directions that were not determined, each {ROW}, one for each parameter"

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -341,27 +340,6 @@ class Experiment:
     def __repr__(self) -> str:
         return f"<Experiment {self.label}: {self.title}>"
 
-    def _repr_html_(self) -> str:
-        volume = self.machine.volume
-        edges = zip(volume.lower.tolist(), volume.upper.tolist(), strict=True)
-        sides = " x ".join(f"{1e3 * (high - low):.6g}" for low, high in edges)
-        repeatability = {f"{1e6 * value:.4g}" for value in self.machine.repeatability.tolist()}
-        rows = [
-            ("volume", f"{sides} mm"),
-            ("repeatability", f"{', '.join(sorted(repeatability))} µm"),
-            ("error model", self.error_model.kind),
-            *(
-                (f"artefact {name}", f"{len(entry.names)} balls")
-                for name, entry in self.layouts.items()
-            ),
-            *((f"position {position.name}", _words_of(position)) for position in self.positions),
-            ("calibrations", str(len(self.calibration))),
-            ("measuring tasks", ", ".join(task.name for task in self.evaluation.tasks) or "none"),
-        ]
-        cells = (f"<tr><td>{escape(name)}</td><td>{escape(text)}</td></tr>" for name, text in rows)
-        title = escape(f"{self.label}: {self.title}")
-        return f"<p><strong>{title}</strong></p>\n<table>{''.join(cells)}</table>\n"
-
     def place(self, steps: Steps) -> Mark:
         """Return the location of a path, or of the experiment if the file does not contain it."""
         return self.mark if written(self.tree, *steps) is None else mark_of(self.tree, steps)
@@ -405,13 +383,3 @@ class Experiment:
         columns = {**settings_before.get("columns", {}), **settings_given.get("columns", {})}
         merged = {**settings_before, **settings_given, **({"columns": columns} if columns else {})}
         return self.with_(readings=merged)
-
-
-def _words_of(position: Position) -> str:
-    """Return a description of the readings of a position."""
-    groups = (
-        f"{len(group.balls)} balls with {', '.join(group.probes)}"
-        + (f", {group.repeats} times" if group.repeats > 1 else "")
-        for group in position.readings
-    )
-    return f"{position.artefact}: {'; '.join(groups)}"

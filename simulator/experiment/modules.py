@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from ..inputs.messages import ExperimentError, Steps
-from ..inputs.yamltree import Mapping, Node, Scalar, walk
+from ..inputs.yamltree import Mapping, Node, Scalar, read_tree, walk
 
 
 def python_models(root: Node) -> Iterator[tuple[Steps, Mapping]]:
@@ -40,11 +40,8 @@ def _named_maps(root: Node) -> Iterator[Scalar]:
 
 
 def _has_model_in_python(path: Path) -> bool:
-    # Loaded where a map is named: few experiments have any.
-    from .map_files import map_tree
-
     try:
-        return any(python_models(map_tree(path, [])[0]))
+        return any(python_models(read_tree(path, [])))
     except ExperimentError:
         # Told when it is loaded.
         return False

@@ -30,7 +30,7 @@ def check_installed(names: Any, problems: Problems) -> None:
         if not is_installed(name):
             text = f'the extension "{name}", which this file needs, is not installed; install it'
             # One that is installed and cannot be loaded has no name.
-            problems.add(("extensions", i), "; ".join((text, *registered().complaints)))
+            problems.add(("extensions", i), "; ".join((text, *registered()[1])))
 
 
 def needed_extensions(sections: Sections) -> tuple[str, ...]:

@@ -208,14 +208,14 @@ def _in_plane(
     first, second = sorted(axes)
     is_right = True
     for axis in ("x", "y", "z"):
-        is_written = axis in point.stated
+        is_written = axis in point
         if axis in axes:
             is_right &= references.require(is_written, (*steps, axis), f'missing; add "{axis}"')
         elif is_written:
             text = f"is not an axis of the plane; give {first} and {second}"
             references.problems.add((*steps, axis), text, of_key=True)
             is_right = False
-    return (getattr(point, axes[0]), getattr(point, axes[1])) if is_right else None
+    return (point[axes[0]], point[axes[1]]) if is_right else None
 
 
 def _free_placement(pose: Any, steps: Steps, references: References) -> FreePlacement | None:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeVar, Union
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, Union
 
 from pydantic import Discriminator, Field, Tag, create_model, model_validator
 
 from ..design.observations.coordinates import CalibratedBalls
 from ..design.observations.kinds import CALIBRATIONS
-from ..geometry.ball_layouts import BallNames, Name
+from ..geometry.ball_layouts import Name
 from ..geometry.positions import Axis
 from ..inputs.open_kinds import OpenKinds
 from ..inputs.quantities import Duration, Length
@@ -17,7 +17,6 @@ from ..inputs.room_parts import Place, RoomPart
 from ..inputs.settings import Forms, NonEmpty, Settings, Several, Text
 from .position_sections import Count, LengthPerAxis, PositionSettings, ProbeNames, QuarterTurns
 
-AXES = ("x", "y", "z")
 GROUP_KEYS = ("planes", "levels", "corners", "centres")
 
 Seconds = Duration | None
@@ -66,80 +65,23 @@ class RangeSettings(Settings):
 
 
 Places = Forms[Place, Several[Place], RangeSettings]
+PlacesByAxis = dict[Axis, Places]
 
 
-class PlacesByAxisSettings(Settings):
-    """Lengths, or parts of the free room, along each axis: one, a list, or a range."""
-
-    x: Places | None = Field(None, description="along x")
-    y: Places | None = Field(None, description="along y")
-    z: Places | None = Field(None, description="along z")
-
-
-def _form_of_levels(value: Any) -> str:
-    if isinstance(value, dict):
-        return "<planes>" if set(value) & set(AXES) else "<range>"
-    return "<list>" if isinstance(value, tuple) else "<one>"
-
-
-Levels = Annotated[
-    Annotated[Place, Tag("<one>")]
-    | Annotated[Several[Place], Tag("<list>")]
-    | Annotated[RangeSettings, Tag("<range>")]
-    | Annotated[PlacesByAxisSettings, Tag("<planes>")],
-    Discriminator(_form_of_levels),
-]
-
-
-def _form_of_sets(value: Any) -> str:
-    if isinstance(value, dict):
-        return "<planes>"
-    return (
-        "<sets>"
-        if isinstance(value, tuple) and any(isinstance(item, tuple) for item in value)
-        else "<list>"
-    )
-
-
-ByPlane = TypeVar("ByPlane")
 ProbeSets = Annotated[
-    Annotated[ProbeNames, Tag("<list>")]
-    | Annotated[Several[ProbeNames], Tag("<sets>")]
-    | Annotated[ByPlane, Tag("<planes>")],
-    Discriminator(_form_of_sets),
-]
-ProbesOfPlane = ProbeSets[ProbeNames]
-
-
-class ProbesByPlaneSettings(Settings):
-    """Probes, or sets of them to choose from, in each plane."""
-
-    x: ProbesOfPlane | None = Field(None, description="in planes across x")
-    y: ProbesOfPlane | None = Field(None, description="in planes across y")
-    z: ProbesOfPlane | None = Field(None, description="in planes across z")
-
-
-def form_of_balls(value: Any) -> str:
-    """True if balls are stated by a word, as a list of names, or as a list of such sets."""
-    if not isinstance(value, tuple):
-        return "<one>"
-    return (
-        "<sets>"
-        if any(isinstance(item, tuple) or item in ("all", "corners") for item in value)
-        else "<list>"
-    )
-
-
-GroupBalls = Annotated[
-    Annotated[Literal["all", "corners"], Tag("<one>")]
-    | Annotated[BallNames, Tag("<list>")]
-    | Annotated[Several[CalibratedBalls], Tag("<sets>")],
-    Discriminator(form_of_balls),
+    Annotated[ProbeNames, Tag("<list>")] | Annotated[Several[ProbeNames], Tag("<sets>")],
+    Discriminator(
+        lambda value: (
+            "<sets>"
+            if isinstance(value, tuple) and any(isinstance(item, tuple) for item in value)
+            else "<list>"
+        )
+    ),
 ]
 
 
 class GroupSettings(Settings):
-    """Candidates that are every combination of planes, levels, places, turns, probes and balls."""
+    """Candidates that are every combination of planes, levels, places, turns and probes."""
 
     name: Name | None = Field(
         None, description="of the group; the names of its candidates begin with it"
@@ -153,39 +95,34 @@ class GroupSettings(Settings):
             "axes that the artefact's plane is normal to, such as [x, y, z]; omitted in 2-D"
         ),
     )
-    levels: Levels | None = Field(
+    levels: Places | None = Field(
         None,
         description=(
-            "co-ordinates of the planes: a list, such as [low, 30 %, 750 mm], {from: 0 mm, to: 1"
-            " m, count: 5}, or by plane {x: …, z: …}; omitted in 2-D"
+            "co-ordinates of the planes: a list, such as [low, 30 %, 750 mm], or {from: 0 mm, to:"
+            " 1 m, count: 5}; omitted in 2-D"
         ),
     )
-    corners: PlacesByAxisSettings | None = Field(
+    corners: PlacesByAxis | None = Field(
         None,
         description=(
             "lower corners of the turned bounding rectangle along each axis, as lists or ranges"
             " of lengths or of parts of the free room"
         ),
     )
-    centres: PlacesByAxisSettings | None = Field(
+    centres: PlacesByAxis | None = Field(
         None, description="centres of the bounding rectangle along each axis, instead of corners"
     )
     quarter_turns: Forms[QuarterTurns, Several[QuarterTurns], QuarterTurns] = Field(
         0, description="one number of turns by 90 degrees, 0 to 3, or a list; default 0"
     )
-    probes: ProbeSets[ProbesByPlaneSettings] | None = Field(
+    probes: ProbeSets | None = Field(
         None,
         description=(
             "names of probes, or a list of such sets to choose from, [[right, left], [right]];"
-            " either for all planes or by plane; optional if there is exactly one probe"
+            " optional if there is exactly one probe"
         ),
     )
-    balls: GroupBalls = Field(
-        "all",
-        description=(
-            "all (default), corners, a list of balls, or a list of such sets, [all, corners]"
-        ),
-    )
+    balls: CalibratedBalls = Field("all", description="all (default), corners, or a list of balls")
     repeats: Count = Field(
         1, description="how often every ball is read with every probe; default 1"
     )
@@ -257,7 +194,9 @@ else:
 class SelectorSettings(Settings):
     """Which candidates are meant: those to which everything stated applies."""
 
-    name: Text | None = Field(None, description='name, in which * matches anything, such as "z *"')
+    name: Forms[Text, NonEmpty[Text], NonEmpty[Text]] | None = Field(
+        None, description='name, in which * matches anything, such as "z *", or a list of names'
+    )
     group: Name | None = Field(None, description="name of their entry in pool.candidates")
     plane: Axis | None = Field(None, description="axis that the artefact's plane is normal to")
     artefact: Name | None = Field(None, description="name of the artefact")
@@ -279,18 +218,8 @@ class AtMostSettings(Settings):
     count: Annotated[int, Field(ge=0, le=100_000)] = Field(description="how many of them at most")
 
 
-Ends = tuple[Length, Length]
-
-
-class RegionSettings(Settings):
-    """A region by its ends along the axes; axes that are left out are not limited."""
-
-    x: Ends | None = Field(None, description="lower and upper end along x")
-    y: Ends | None = Field(None, description="lower and upper end along y")
-    z: Ends | None = Field(None, description="lower and upper end along z")
-
-
-Together = Annotated[tuple[Name, ...], Field(min_length=2)]
+# Lower and upper ends; axes that are left out are not limited.
+Region = dict[Axis, tuple[Length, Length]]
 
 
 class LimitsSettings(Settings):
@@ -299,17 +228,14 @@ class LimitsSettings(Settings):
     keep: Forms[Literal["all"], tuple[Name, ...], tuple[Name, ...]] = Field(
         (), description="candidates that must be chosen, by name; all: every position of the file"
     )
-    never_together: tuple[Together, ...] = Field(
-        (), description="lists of names; at most one of each list is chosen"
-    )
     at_most: tuple[AtMostSettings, ...] = Field(
         (), description="{of: {plane: x}, count: 2} and the like"
     )
-    reach: dict[Name, RegionSettings] = Field(
+    reach: dict[Name, Region] = Field(
         default_factory=dict,
         description="name of a probe → region in which it can read balls, {x: [200 mm, 1 m]}",
     )
-    forbidden: tuple[RegionSettings, ...] = Field(
+    forbidden: tuple[Region, ...] = Field(
         (),
         description=(
             "boxes, {x: [0 mm, 200 mm], y: [0 mm, 200 mm]}, that no artefact may enter: the box"

@@ -4,16 +4,17 @@ choice.
 
 from __future__ import annotations
 
+import fnmatch
+from collections import Counter
 from collections.abc import Iterable
 from collections.abc import Mapping as AnyMapping
 from collections.abc import Sequence as AnySequence
 from dataclasses import dataclass, field, replace
-from fnmatch import fnmatchcase
 from typing import Any
 
 import numpy as np
 
-from ..design.lookup import ReadingCount, References
+from ..design.lookup import References
 from ..design.observations.calibration import Calibration
 from ..design.observations.radius import RadiusCalibration
 from ..geometry.positions import AXIS_INDEX
@@ -103,7 +104,7 @@ def resolve_candidates(
         result.complete = node is None
         return result
     # The candidates have a limit of their own.
-    references = replace(references, tally=ReadingCount())
+    references = replace(references, tally=Counter())
     # Candidates may be what a key that is misspelt or no list was meant to be.
     is_known = isinstance(node, Mapping) and set(node.items) <= set(PoolSettings.model_fields)
     is_list = isinstance(written(root, "pool", "candidates"), Sequence | None)
@@ -415,10 +416,6 @@ def _limits(
     else:
         must = of_names(limits.keep, (*place, "keep"))
     at_most = []
-    for k, names in enumerate(limits.never_together):
-        members = of_names(names, (*place, "never_together", k))
-        if len(members) > 1:
-            at_most.append((AtMost(tuple(members), 1), (*place, "never_together", k)))
     for k, limit in enumerate(limits.at_most):
         members = _selected(
             limit.of, candidates, complete, (*place, "at_most", k, "of"), references
@@ -462,12 +459,16 @@ def _selected(
             return []
     tests = []
     if selector.name is not None:
-        pattern = selector.name
-        tests.append(lambda candidate: fnmatchcase(candidate.name, pattern))
-        if complete and not any(fnmatchcase(candidate.name, pattern) for candidate in candidates):
-            references.problems.add(
-                (*steps, "name"), f'no candidate has a name such as "{pattern}"; correct it'
-            )
+        stated = selector.name
+        patterns = stated if isinstance(stated, tuple) else (stated,)
+        for k, pattern in enumerate(patterns if complete else ()):
+            if not fnmatch.filter((candidate.name for candidate in candidates), pattern):
+                place = (*steps, "name", *((k,) if isinstance(stated, tuple) else ()))
+                text = f'no candidate has a name such as "{pattern}"; correct it'
+                references.problems.add(place, text)
+        tests.append(
+            lambda candidate: any(fnmatch.fnmatchcase(candidate.name, each) for each in patterns)
+        )
     if selector.group is not None:
         tests.append(lambda candidate: candidate.group == selector.group)
     if selector.plane is not None:

@@ -38,16 +38,6 @@ Edges = Annotated[tuple[PositiveLength, ...], Field(min_length=2, max_length=3)]
 LengthPerAxis = Forms[PositiveLength, Edges, AxisLengthsSettings]
 
 
-class InPlaneSettings(Settings):
-    """A point in a machine plane: its co-ordinates along the plane's two axes, as lengths or parts
-    of the free room.
-    """
-
-    x: Place | None = Field(None, description=f"along x: {PLACE}")
-    y: Place | None = Field(None, description=f"along y: {PLACE}")
-    z: Place | None = Field(None, description=f"along z: {PLACE}")
-
-
 class PoseSettings(Settings):
     """A free pose x = R y + origin of an artefact."""
 
@@ -101,10 +91,14 @@ class PositionSettings(Settings):
         None,
         description=f"co-ordinate of the plane along that axis, {PLACE}; omitted in 2-D",
     )
-    corner: InPlaneSettings | None = Field(
-        None, description="lower corner of the turned bounding rectangle"
+    corner: dict[Axis, Place] | None = Field(
+        None,
+        description=(
+            "lower corner of the turned bounding rectangle: along each of the plane's two axes,"
+            f" {PLACE}"
+        ),
     )
-    centre: InPlaneSettings | None = Field(
+    centre: dict[Axis, Place] | None = Field(
         None, description="centre of the bounding rectangle, instead of corner"
     )
     quarter_turns: QuarterTurns | None = Field(

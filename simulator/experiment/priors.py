@@ -12,7 +12,7 @@ from ..geometry.artefacts import BryanGaugeSettings
 from ..geometry.motions import AXIS_NAMES, pose_parameter_names
 from ..inputs.messages import Steps, format_path
 from ..inputs.number_arrays import Array
-from ..inputs.quantities import QuantityError, parse_angle, parse_length, parse_ratio
+from ..inputs.quantities import PARSERS, QuantityError
 from ..inputs.settings import hint, shorten
 from ..inputs.yamltree import mark_of
 from ..machines.custom import CustomModelError
@@ -23,7 +23,6 @@ from .sections import MapPriorSettings, PriorSettings
 from .structure import Sections
 
 MOST_PRIORS = 5000
-PARSERS = {"m": parse_length, "rad": parse_angle, "1": parse_ratio}
 
 
 def resolve_priors(

@@ -55,10 +55,9 @@ def check_readings(sections: Sections, references: References) -> None:
 
 def _check_constants(columns: ColumnsSettings, references: References) -> None:
     """Report settings that cannot be the same in all rows, and an invalid constant uncertainty."""
-    for role in ("ball", "diameter"):
-        if (getattr(columns, role) or "").startswith("="):
-            text = f"a {role} is that of a reading, and not of all rows; name its column"
-            references.problems.add(("readings", "columns", role), text)
+    if (columns.ball or "").startswith("="):
+        text = "a ball is that of a reading, and not of all rows; name its column"
+        references.problems.add(("readings", "columns", "ball"), text)
     if (columns.u or "").startswith("="):
         try:
             parse_positive_length((columns.u or "")[1:].strip())

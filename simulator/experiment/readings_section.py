@@ -50,7 +50,6 @@ class ColumnsSettings(Settings):
     u: Name | None = Field(
         None, description="standard uncertainties of each co-ordinate; or =0.2 um, of all rows"
     )
-    diameter: Name | None = Field(None, description="diameters of the balls as measured")
 
 
 class ReadingsSettings(Settings):

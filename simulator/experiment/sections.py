@@ -14,7 +14,7 @@ from ..design.observations.kinds import CalibrationSettings
 from ..geometry.artefacts import ARTEFACTS, AnyArtefactSettings
 from ..geometry.ball_layouts import Coordinates, Name
 from ..inputs.days import Day
-from ..inputs.quantities import Length, LengthFunction, PositiveLength
+from ..inputs.quantities import Length, PositiveLength, TargetFunction
 from ..inputs.settings import Forms, NonEmpty, Settings, Several, Text
 from ..machines.settings import ErrorModelSettings
 from ..machines.true_machine_settings import TrueMachineSettings, ZeroSettings
@@ -142,7 +142,7 @@ class TaskSettings(Settings):
     probes: tuple[Name, Name] | None = Field(
         None, description="probes of the two ends, instead of probe"
     )
-    target_uncertainty: LengthFunction | None = Field(
+    target_uncertainty: TargetFunction | None = Field(
         None,
         description=("target uncertainty of the task; default: target_uncertainty of the file"),
     )
@@ -227,12 +227,11 @@ class ExperimentSettings(Settings):
     evaluation: EvaluationSettings | None = Field(
         None, description="points and lengths for which the machine's uncertainty is evaluated"
     )
-    target_uncertainty: LengthFunction | None = Field(
+    target_uncertainty: TargetFunction | None = Field(
         None,
         description=(
             "largest standard uncertainty, or coverage_factor times that, that is accepted, such as"
-            " 0.5 um + L/1000000 with L in metres, 0.9 um + 2.5 um/m, or (0.9 + L/400) um with L"
-            " in mm"
+            " 0.5 um + L/1000000 with L in metres, or 0.9 um + 2.5 um/m"
         ),
     )
     coverage_factor: Annotated[float, Field(ge=1, le=10, strict=True)] = Field(

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import Annotated, Any, get_args
-from weakref import WeakKeyDictionary
+from typing import Annotated, Any
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -25,7 +24,6 @@ from .pool_sections import GroupSettings, ListedSettings, PoolSettings, PricedSe
 from .position_sections import PositionSettings
 from .probe_sections import AnyProbe, StarSettings
 from .sections import AnyPrior, ExperimentSettings
-from .variants import ALIASES
 
 # Sections whose entries are validated one by one: form of the section and type of an entry.
 ENTRIES: dict[str, tuple[type[Mapping] | type[Sequence], Any]] = {
@@ -37,9 +35,6 @@ ENTRIES: dict[str, tuple[type[Mapping] | type[Sequence], Any]] = {
     "stars": (Sequence, StarSettings),
     "influences": (Sequence, AnyInfluence),
 }
-
-# Sections that files complete which they name, and which may say something else next time.
-COMPLETED_LATER = ("error_model", "true_machine", "readings")
 
 # Other files of this program, by a key that an experiment has not, and what they are for.
 OTHER_FILES = {
@@ -55,11 +50,7 @@ OTHER_FILES = {
 }
 
 # Keys that are no extension's.
-KEYS = (*ExperimentSettings.model_fields, *OTHER_FILES, *ALIASES)
-
-# Values of nodes that are valid, by their types. Trees that differ in a few nodes, such as those of
-# a sweep's cells, share all others.
-_VALID: WeakKeyDictionary[Node, dict[TypeAdapter[Any], Any]] = WeakKeyDictionary()
+KEYS = (*ExperimentSettings.model_fields, *OTHER_FILES)
 
 
 @dataclass(frozen=True)
@@ -106,12 +97,9 @@ def validate_sections(root: Node, problems: Problems, planning: bool = False) ->
         if settings is not None:
             if not (isinstance(settings, type) and issubclass(settings, Settings)):
                 raise UnusableError(f"SETTINGS of the section {key} is no Settings")
-            values |= _validate([type_adapter(settings)], node, (key,), problems)
+            values |= _validate(type_adapter(settings), node, (key,), problems)
             continue
-        text = f"unknown key; {_known_key(key, absent)}"
-        if key in ALIASES:
-            text = f"this is the earlier name of {ALIASES[key]}, which is there too; remove one"
-        problems.add((key,), text, True)
+        problems.add((key,), f"unknown key; {_known_key(key, absent)}", True)
         misspelt.add(nearest(key, absent))
     for key, field in fields.items():
         node_or_none = root.items.get(key)
@@ -133,7 +121,7 @@ def validate_sections(root: Node, problems: Problems, planning: bool = False) ->
         elif key == "pool":
             values |= _validate_pool(node_or_none, problems)
         elif key != "variants":
-            values |= _validate(_adapters(key, node_or_none), node_or_none, (key,), problems)
+            values |= _validate(_adapter(key), node_or_none, (key,), problems)
     return Sections(values)
 
 
@@ -162,17 +150,17 @@ def _validate_entries(key: str, node: Node, problems: Problems) -> dict[Steps, A
     entries = node.items.items() if isinstance(node, Mapping) else enumerate(node.items)
     values: dict[Steps, Any] = {}
     for step, item in entries:
-        values |= _validate(_adapters(key, item), item, (key, step), problems)
+        values |= _validate(_adapter(key), item, (key, step), problems)
     return values
 
 
 def _validate_pool(node: Node, problems: Problems) -> dict[Steps, Any]:
     """Values of the pool's times and limits, and of each of its entries."""
     if not isinstance(node, Mapping):
-        return _validate([_adapter("pool")], node, ("pool",), problems)
+        return _validate(_adapter("pool"), node, ("pool",), problems)
     values: dict[Steps, Any] = {("pool",): None}
     further = {key: item for key, item in node.items.items() if key not in POOL_ENTRIES}
-    whole = _validate([_adapter("pool")], replace(node, items=further), ("pool",), problems).get(
+    whole = _validate(_adapter("pool"), replace(node, items=further), ("pool",), problems).get(
         ("pool",)
     )
     whole = whole or PoolSettings.model_validate({})
@@ -182,7 +170,7 @@ def _validate_pool(node: Node, problems: Problems) -> dict[Steps, Any]:
         if isinstance(entries, Sequence):
             for i, item in enumerate(entries.items):
                 adapter = type_adapter(kind_of(item))
-                values |= _validate([adapter], item, ("pool", key, i), problems)
+                values |= _validate(adapter, item, ("pool", key, i), problems)
         elif entries is not None and not (isinstance(entries, Scalar) and entries.value is None):
             form = describe(to_python(entries) if isinstance(entries, Scalar) else {})
             description = PoolSettings.model_fields[key].description
@@ -207,49 +195,14 @@ POOL_ENTRIES: dict[str, Callable[[Node], Any]] = {
 
 
 def _validate(
-    adapters: Iterable[TypeAdapter[Any]], node: Node, steps: Steps, problems: Problems
+    adapter: TypeAdapter[Any], node: Node, steps: Steps, problems: Problems
 ) -> dict[Steps, Any]:
-    """Return the value of a node by the first of some adapters that accepts it; the last reports
-    faults.
-    """
-    valid = {} if steps[0] in COMPLETED_LATER else _VALID.setdefault(node, {})
-    for adapter in adapters:
-        if adapter in valid:
-            return {steps: valid[adapter]}
-        try:
-            valid[adapter] = adapter.validate_python(to_python(node))
-            return {steps: valid[adapter]}
-        except ValidationError as error:
-            refusal = error
-    explain_in(problems, refusal, adapter, node, steps)
+    """Return the value of a node, or report its faults."""
+    try:
+        return {steps: adapter.validate_python(to_python(node))}
+    except ValidationError as error:
+        explain_in(problems, error, adapter, node, steps)
     return {}
-
-
-def _adapters(key: str, node: Node) -> Iterator[TypeAdapter[Any]]:
-    """Return the adapters of a section, or an entry of it: its stated `kind`, then every one.
-
-    The form of one is built in a fraction of the time of all, which only error messages need.
-    """
-    kind = node.items.get("kind") if isinstance(node, Mapping) else None
-    if isinstance(kind, Scalar) and isinstance(kind.value, str):
-        adapter = _kinds(key).get(kind.value)
-        if adapter is not None:
-            yield type_adapter(adapter)
-    yield _adapter(key)
-
-
-@cache
-def _kinds(key: str) -> dict[str, type[Settings]]:
-    """The classes among which the word `kind` chooses in a section or its entries, by that word."""
-    union, *about = get_args(_form(key)) or (None,)
-    about += [annotation for field in about for annotation in getattr(field, "metadata", ())]
-    if not any(getattr(annotation, "discriminator", None) == "kind" for annotation in about):
-        return {}
-    return {
-        word: annotation
-        for annotation in get_args(union)
-        for word in get_args(annotation.model_fields["kind"].annotation)
-    }
 
 
 @cache

@@ -9,24 +9,21 @@ from datetime import date
 import numpy as np
 
 from ..design.lookup import References
-from ..design.objects import Machine
+from ..design.objects import Machine, Volume
+from ..geometry.grids import even_grid
 from ..inputs.days import parse_day
 from ..inputs.messages import ExperimentError, Steps, format_path
-from ..inputs.quantities import format_length
 from ..inputs.settings import listing
 from ..inputs.yamltree import mark_of, read_bytes
-from ..machines.protocol import ErrorModel, TrueMachine
+from ..machines.protocol import Array, ErrorModel, TrueMachine
 from ..machines.true_machine_settings import TrueMapSettings
 from ..maps.fitted_map import FittedMap
 from ..maps.map_prior import MapShare, campaign_of, determined_combinations, marginal_of
-from .map_content import corner_corrections
 from .map_files import read_map
 from .model import Prior, Probe
 from .sections import MapPriorSettings
+from .volumes import check_within
 
-AXES = ("x", "y", "z")
-# Ends of volumes that are the same, in metres.
-TOLERANCE = 1e-9
 YEAR = 365.25
 # The same corrections, in metres, and in parts of them.
 SAME, SAME_PART = 1e-12, 1e-9
@@ -57,7 +54,7 @@ def read_true_map(truth: TrueMapSettings, machine: Machine | None, references: R
         text = f"is of {true_map.dimension} axes, but machine.volume of {machine.dimension}"
         references.problems.add(steps, f"{text}; name another map")
         return
-    _check_ends(true_map, machine, steps, references, outside_only=True)
+    check_within(*true_map.volume.corners, machine, steps, references)
 
 
 def resolve_map_prior(
@@ -78,10 +75,6 @@ def resolve_map_prior(
     fitted = _read(settings.file, of_file, references)
     years = None if fitted is None else _years(settings, fitted, steps, references)
     if fitted is None or years is None or not _is_same(fitted, model, machine, of_file, references):
-        return []
-    if fitted.conversion_residual is not None:
-        text = "was converted from another error model, and has values that no readings determined"
-        problems.add(of_file, f"{text}; use the map that fit wrote")
         return []
     kept_indices = np.arange(len(fitted.values))
     free = [
@@ -141,7 +134,7 @@ def _read(file: str, steps: Steps, references: References) -> FittedMap | None:
     except ExperimentError as error:
         references.problems.take(error, steps)
         return None
-    if caution := fitted.known_lack_of_fit.caution:
+    if caution := fitted.lack_of_fit.caution:
         references.problems.doubt(steps, caution)
     return fitted
 
@@ -182,7 +175,8 @@ def _is_same(
     if machine.dimension != fitted.dimension:
         add(steps, f"is of {fitted.dimension} axes, but machine.volume of {machine.dimension}")
         return False
-    if not _check_ends(fitted, machine, steps, references, outside_only=False):
+    remedy = "make them the same, or convert the map"
+    if not check_within(*fitted.volume.corners, machine, steps, references, remedy, is_same=True):
         return False
     model_parameters = [(parameter.name, parameter.unit) for parameter in model.parameters]
     map_parameters = [(parameter.name, parameter.unit) for parameter in fitted.model.parameters]
@@ -190,12 +184,12 @@ def _is_same(
         differ = [name for name, _ in set(model_parameters) ^ set(map_parameters)]
         text = (
             f"is of another error model (parameters differ: {listing(sorted(differ), 4)}); fit with"
-            " the same model, or convert the map"
+            " the same model"
         )
         add(steps, text)
         return False
-    there = corner_corrections(fitted.model, fitted.values, fitted.volume)
-    here = corner_corrections(model, fitted.values, fitted.volume)
+    there = _corner_corrections(fitted.model, fitted.values, fitted.volume)
+    here = _corner_corrections(model, fitted.values, fitted.volume)
     if (np.abs(there - here) > SAME + SAME_PART * np.abs(there)).any():
         text = (
             "is of another error model, which has the same parameters and corrects otherwise; fit"
@@ -206,26 +200,12 @@ def _is_same(
     return True
 
 
-def _check_ends(
-    fitted: FittedMap, machine: Machine, steps: Steps, references: References, outside_only: bool
-) -> bool:
-    """True if the volume is that of the map, or within it if `outside_only`; others are
-    reported.
+def _corner_corrections(model: ErrorModel, values: Array, volume: Volume) -> Array:
+    """Corrections (2^d + 1, d) at the corners and the centre, with a probe of a tenth of the
+    volume.
     """
-    mapped, volume, is_right = fitted.volume, machine.volume, True
-    for k, axis in enumerate(AXES[: fitted.dimension]):
-        ends = float(mapped.lower[k]), float(mapped.upper[k])
-        low, high = float(volume.lower[k]), float(volume.upper[k])
-        if outside_only:
-            is_wrong = low < ends[0] - TOLERANCE or high > ends[1] + TOLERANCE
-        else:
-            is_wrong = abs(low - ends[0]) > TOLERANCE or abs(high - ends[1]) > TOLERANCE
-        if is_wrong:
-            remedy = "stay within it" if outside_only else "make them the same, or convert the map"
-            text = (
-                f"its volume is {format_length(ends[0])} to {format_length(ends[1])} in {axis},"
-                f" but machine.volume is {format_length(low)} to {format_length(high)}; {remedy}"
-            )
-            references.problems.add(steps, text)
-            is_right = False
-    return is_right
+    d = len(volume.lower)
+    corners = even_grid(np.zeros(d), np.ones(d), [2] * d)
+    points = volume.lower + volume.size * np.concatenate([corners, np.full((1, d), 0.5)])
+    offsets = np.broadcast_to(0.1 * volume.size, points.shape)
+    return np.asarray(model.error(points, values, offsets))

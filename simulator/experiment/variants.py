@@ -19,49 +19,7 @@ MOST_VARIANTS = 1000
 # Balls, balls read, calibrated values, priors and evaluation points of all variants of a file,
 # which are loaded together.
 MOST_OF_ALL = 2_000_000
-# Keys of earlier versions: files and paths that have them mean the key of today.
-ALIASES = {"target_accuracy": "target_uncertainty"}  # earlier name first
 STEP = re.compile(r"(?:(?:^|\.)([^.\[\]]+)|\[([^\]]*)\])")
-
-
-def with_present_keys(node: Node, above: tuple[str, ...] = ()) -> Node:
-    """Return the same experiment with the present keys; a key that occurs with its earlier name
-    stays, so that the earlier one is refused as unknown.
-
-    `above` are the steps that lead to the node. Names chosen by the author, such as a probe's,
-    stay.
-    """
-    if isinstance(node, Sequence):
-        # The only list of entries that have such a key.
-        if above != ("evaluation", "tasks"):
-            return node
-        items = tuple(with_present_keys(item, (*above, "")) for item in node.items)
-        changed = any(new is not old for new, old in zip(items, node.items, strict=True))
-        return replace(node, items=items) if changed else node
-    if isinstance(node, Scalar) or not _leads_to_aliases(above):
-        return node
-    keys = {key: _present(key, node) if _has_aliases(above) else key for key in node.items}
-    below = {
-        keys[key]: with_present_keys(item, (*above, keys[key])) for key, item in node.items.items()
-    }
-    if all(below.get(key) is item for key, item in node.items.items()):
-        return node
-    marks = {keys[key]: mark for key, mark in node.key_marks.items()}
-    return replace(node, items=below, key_marks=marks)
-
-
-def _has_aliases(above: AnySequence[str]) -> bool:
-    """True if the keys below some steps have earlier names."""
-    return not above or len(above) == 3 and tuple(above[:2]) == ("evaluation", "tasks")
-
-
-def _leads_to_aliases(above: tuple[str, ...]) -> bool:
-    return _has_aliases(above) or above in (("evaluation",), ("evaluation", "tasks"))
-
-
-def _present(key: str, node: Mapping) -> str:
-    present = ALIASES.get(key, key)
-    return key if present in node.items else present
 
 
 def variant_trees(root: Node, problems: Problems) -> dict[str, Node]:
@@ -145,7 +103,7 @@ def override(root: Node, path: str, value: Node, mark: Mark) -> Node:
         raise ValueError(
             f'"{steps[0]}" cannot be replaced in a variant; {hint(steps[0], section_names)}'
         )
-    return _replaced(root, steps, with_present_keys(value, tuple(steps)), mark, ())
+    return _replaced(root, steps, value, mark, ())
 
 
 def removed(root: Node, path: str) -> Node:
@@ -153,29 +111,11 @@ def removed(root: Node, path: str) -> Node:
 
     :raises ValueError: the path is malformed, or there is no value.
     """
-    return _less(root, list(place_of(root, path)), ())
-
-
-def _less(node: Node, steps: list[str], above: tuple[str, ...]) -> Node:
-    step, deeper = steps[0], steps[1:]
-    here = (*above, step)
-    key = int(step) if isinstance(node, Sequence) else step
-    below = child(node, key)
-    if below is None:
-        items = node.items if isinstance(node, Mapping) else ()
-        raise ValueError(f"there is no {format_path(here)}; {hint(step, items)}")
-    if isinstance(node, Sequence):
-        i = int(step)
-        kept_below = (_less(below, deeper, here),) if deeper else ()
-        return replace(node, items=(*node.items[:i], *kept_below, *node.items[i + 1 :]))
-    assert isinstance(node, Mapping)
-    if deeper:
-        return replace(node, items={**node.items, step: _less(below, deeper, here)})
-    return replace(node, items={name: item for name, item in node.items.items() if name != step})
+    return _replaced(root, steps_of(path), None, root.mark, ())
 
 
 def steps_of(path: str) -> list[str]:
-    """Steps of a path, with the keys of today.
+    """Steps of a path.
 
     :raises ValueError: the path is malformed.
     """
@@ -184,9 +124,7 @@ def steps_of(path: str) -> list[str]:
         raise ValueError(
             f'"{path}" is not a path; write for example positions[1].level or artefacts.plate.size'
         )
-    return [
-        ALIASES.get(step, step) if _has_aliases(steps[:i]) else step for i, step in enumerate(steps)
-    ]
+    return steps
 
 
 def place_of(root: Node, path: str) -> tuple[str, ...]:
@@ -212,21 +150,23 @@ def _overlap(first: tuple[str, ...], second: tuple[str, ...]) -> bool:
 
 
 def _replaced(
-    node: Node, steps: list[str], value: Node, mark: Mark, above: tuple[str, ...]
+    node: Node, steps: list[str], value: Node | None, mark: Mark, above: tuple[str, ...]
 ) -> Node:
-    if not steps:
-        return value
+    """Return a tree with the value at some steps, or without the entry there."""
     step, deeper, here = steps[0], steps[1:], (*above, steps[0])
     if isinstance(node, Mapping):
-        if step not in node.items and deeper:
+        if step not in node.items and (deeper or value is None):
             raise ValueError(f"there is no {format_path(here)}; {hint(step, node.items)}")
         below = _replaced(node.items[step], deeper, value, mark, here) if deeper else value
+        if below is None:
+            return replace(node, items={key: node.items[key] for key in node.items if key != step})
         marks = node.key_marks if deeper else {**node.key_marks, step: mark}
         return replace(node, items={**node.items, step: below}, key_marks=marks)
     if isinstance(node, Sequence):
         i = _index(node, step, above)
-        below = _replaced(node.items[i], deeper, value, mark, here)
-        return replace(node, items=(*node.items[:i], below, *node.items[i + 1 :]))
+        below = _replaced(node.items[i], deeper, value, mark, here) if deeper else value
+        kept = () if below is None else (below,)
+        return replace(node, items=(*node.items[:i], *kept, *node.items[i + 1 :]))
     named = format_path(above) or "the experiment"
     raise ValueError(f"{named} is {describe(node.value)} and has no entries; replace it as a whole")
 

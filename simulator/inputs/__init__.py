@@ -21,7 +21,6 @@ if TYPE_CHECKING:
         NamedMatrix,
         half_digit,
         matrix_problems,
-        unit_of_area,
     )
     from .days import stated_day
     from .decoding import LINE_END, decoded, refuse_controls, text_and_encoding
@@ -42,12 +41,12 @@ if TYPE_CHECKING:
     from .problems import Problems
     from .quantities import (
         ANGLE_UNITS,
-        BASE_UNITS,
         DURATION_UNITS,
+        KINDS,
         LENGTH_UNITS,
+        PARSERS,
         QUANTITY,
         SMALLEST,
-        UNITS,
         CommonPart,
         Length,
         LengthDrift,
@@ -65,16 +64,12 @@ if TYPE_CHECKING:
         parse_angle,
         parse_duration,
         parse_length,
-        parse_length_drift,
         parse_length_function,
         parse_positive_angle,
         parse_positive_length,
         parse_positive_temperature_difference,
         parse_ratio,
-        parse_ratio_drift,
-        plain_number,
         plain_unit,
-        power_of_ten,
         typed_length,
     )
     from .settings import Forms, NonEmpty, Settings, hint, listed, listing, number_of, shorten
@@ -83,15 +78,11 @@ if TYPE_CHECKING:
         MOST_COLUMNS,
         MOST_ROWS,
         FileRow,
-        TableLine,
-        decimal_sign,
         header_cells,
         header_names,
         header_texts,
-        read_number,
         read_table,
         table_lines,
-        wrong_count,
     )
     from .trust import OPENED, UNKNOWN, Trust
     from .unusable import UnusableError

@@ -26,8 +26,7 @@ SAME_DIGITS = 2.0
 class NamedMatrix:
     """A covariance matrix (m, m), in square metres, or a correlation matrix of values with `names`.
 
-    `rounding` (m, m) is half a unit of the entries' last digits, `marks` are those of the rows, and
-    `unit` is the length whose square the file states, for messages.
+    `rounding` (m, m) is half a unit of the entries' last digits, `marks` are those of the rows.
     """
 
     names: tuple[str, ...]
@@ -35,24 +34,10 @@ class NamedMatrix:
     rounding: Array
     is_correlation: bool
     marks: tuple[Mark, ...]
-    unit: str = "um"
 
     def shown(self, value: float) -> str:
-        """Return an entry as in the file, with its unit."""
-        if self.is_correlation:
-            return f"{value:.6g}"
-        area = float(LENGTH_UNITS[self.unit] ** 2)
-        return f"{value / area:.6g} {self.unit.replace('u', 'µ')}²"
-
-
-def unit_of_area(area: float) -> str:
-    """Return the length unit whose square is an area in square metres; by default micrometres.
-
-    >>> unit_of_area(1e-6), unit_of_area(1e-18), unit_of_area(2.0)
-    ('mm', 'nm', 'um')
-    """
-    units = LENGTH_UNITS.items()
-    return next((name for name, unit in units if abs(area / float(unit**2) - 1.0) < 1e-9), "um")
+        """Return an entry for messages."""
+        return f"{value:.6g}" if self.is_correlation else f"{1e12 * value:.6g} µm²"
 
 
 def half_digit(text: str) -> float:
@@ -127,8 +112,7 @@ def read_matrix(path: Path) -> NamedMatrix:
         raise ExperimentError(messages[:MOST_MESSAGES])
     scale = 1.0 if factor is None else factor
     matrix = NamedMatrix(
-        *(tuple(names), values * scale, rounding * scale, factor is None, tuple(marks)),
-        unit=unit_of_area(scale),
+        tuple(names), values * scale, rounding * scale, factor is None, tuple(marks)
     )
     errors = matrix_problems(matrix)
     if errors:

@@ -57,7 +57,7 @@ class Command:
     """A command: its `module`, which has DESCRIPTION, add_options and run, its line `help` and its
     `group` in the help.
 
-    A name such as "run --lengths" makes a separate command of another command's option.
+    A name such as "run --errors" makes a separate command of another command's option.
     """
 
     module: str
@@ -131,18 +131,10 @@ def _described(error: Exception) -> str:
     return f"{type(error).__name__}: {error}"
 
 
-@dataclass(frozen=True)
-class Registered:
-    """Extensions that are installed but not shipped, and the reasons why others are refused."""
-
-    extensions: tuple[Extension, ...]
-    complaints: tuple[str, ...]
-
-
 @cache
-def registered() -> Registered:
-    """Return extensions of other packages, without those that cannot be loaded or provide a name
-    that ballplate or another extension has.
+def registered() -> tuple[tuple[Extension, ...], tuple[str, ...]]:
+    """Return extensions of other packages, and why others, which cannot be loaded or provide a name
+    that ballplate or another extension has, are refused.
     """
     extensions, complaints = list[Extension](), list[str]()
     for point in _entry_points():
@@ -154,7 +146,7 @@ def registered() -> Registered:
             complaints.append(f"entry point {point.name} of {package} is not used: {reason}")
         else:
             extensions.append(extension)
-    return Registered(tuple(extensions), tuple(complaints))
+    return tuple(extensions), tuple(complaints)
 
 
 def _checked(extension: object, before: Sequence[Extension]) -> Extension:
@@ -220,7 +212,7 @@ def shipped() -> tuple[Extension, ...]:
 
 
 def _shipped_and_registered() -> tuple[Extension, ...]:
-    return (*shipped(), *registered().extensions)
+    return (*shipped(), *registered()[0])
 
 
 def names(kind: str, with_registered: bool = False) -> tuple[str, ...]:
@@ -232,14 +224,14 @@ def names(kind: str, with_registered: bool = False) -> tuple[str, ...]:
 def installed_functions() -> tuple[str, ...]:
     """Return functions of installed extensions."""
     there = (extension for extension in shipped() if extension.is_installed)
-    extensions = (*there, *registered().extensions)
+    extensions = (*there, *registered()[0])
     return tuple(name for extension in extensions for name in extension.functions)
 
 
 def provider(kind: str, name: str) -> Extension | None:
     """Return the extension that provides a name, or None."""
     # Entry points are read only for a name that is not shipped.
-    for extensions in (shipped, lambda: registered().extensions):
+    for extensions in (shipped, lambda: registered()[0]):
         for extension in extensions():
             if name in getattr(extension, kind):
                 return extension
@@ -279,7 +271,7 @@ def fault_of(error: Exception) -> str | None:
     """Return file, line and name of the extension, not shipped, whose code raised an error, or
     None.
     """
-    packages = {extension.package: extension.name for extension in registered().extensions}
+    packages = {extension.package: extension.name for extension in registered()[0]}
     fault, trace = None, error.__traceback__
     while trace is not None:
         module = f"{trace.tb_frame.f_globals.get('__name__')}."
@@ -331,11 +323,3 @@ def function(name: str) -> Any:
     :raises MissingExtensionError: its extension is not installed.
     """
     return getattr(module_with("functions", name), name)
-
-
-def optional_function(name: str) -> Any | None:
-    """Return such a function, or None if its extension is not installed."""
-    try:
-        return function(name)
-    except MissingExtensionError:
-        return None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-import sysconfig
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout
@@ -18,37 +17,22 @@ from .number_arrays import Array
 from .settings import shorten
 from .unusable import UnusableError
 
-# Packages that the program uses, by their folders.
-LIBRARIES = frozenset(
-    ("distributed", "filelock", "joblib", "matplotlib", "numpy", "pandas", "pyarrow")
-    + ("pydantic", "pydantic_core", "scipy", "threadpoolctl", "tqdm", "yaml", "dask", "tornado")
+# Packages that are not the user's own.
+OTHERS = frozenset(
+    {"ballplate", *sys.stdlib_module_names}
+    | {"distributed", "filelock", "jinja2", "joblib", "matplotlib", "numpy", "pandas", "pyarrow"}
+    | {"pydantic", "pydantic_core", "scipy", "tabulate", "threadpoolctl", "tqdm", "yaml", "dask"}
+    | {"tornado"}
 )
-# Folders of the standard library.
-STANDARD = (Path(traceback.__file__).parent, Path(sysconfig.get_path("platstdlib")))
 
 
 def own_frame(error: BaseException) -> traceback.FrameSummary | None:
     """Return the innermost frame of user code that an error came through, or None."""
-    program = {
-        getattr(module, "__file__", None)
-        for name, module in list(sys.modules.items())
-        if name.partition(".")[0] == "ballplate"
-    }
-    for frame in reversed(traceback.extract_tb(error.__traceback__)):
-        file = frame.filename
-        if not file.startswith("<") and file not in program and not _is_library(file):
-            return frame
+    for frame, line in reversed([*traceback.walk_tb(error.__traceback__)]):
+        package = str(frame.f_globals.get("__name__")).partition(".")[0]
+        if package not in OTHERS:
+            return traceback.FrameSummary(frame.f_code.co_filename, line, frame.f_code.co_name)
     return None
-
-
-def _is_library(file: str) -> bool:
-    parts = Path(file).parts
-    for folder in ("site-packages", "dist-packages"):
-        if folder in parts[:-1]:
-            # By the innermost one: virtual environments may be inside each other.
-            inner = len(parts) - 1 - parts[::-1].index(folder)
-            return parts[inner + 1].removesuffix(".py") in LIBRARIES
-    return any(Path(file).is_relative_to(folder) for folder in STANDARD)
 
 
 def error_text(error: BaseException, frame: traceback.FrameSummary | None) -> str:
@@ -115,7 +99,8 @@ def own_array(
         fault = "returns values that are not finite numbers"
     if fault:
         raise _failed(_definition(call), getattr(call, "__name__", ""), fault)
-    return np.asarray(result, float)
+    # A copy: the code may return the same array again.
+    return np.array(result, float)
 
 
 def _failed(where: str, name: str, text: str) -> OwnCodeError:

@@ -22,9 +22,7 @@ from .quantities import (
     QuantityError,
     Units,
     metres_or_radians,
-    plain_number,
     plain_unit,
-    power_of_ten,
 )
 from .settings import hint, listing, shorten
 from .spreadsheets import text_of_cell
@@ -45,8 +43,6 @@ DECIMALS = re.compile(r"[+-]?[0-9]*([.,])[0-9]*(?:[eE][+-]?[0-9]+)?")
 MOST_ROWS = 1_000_000
 # Far more than there are names for.
 MOST_COLUMNS = 1000
-# Different texts of rows that are cached.
-MOST_CACHED = 100_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,16 +150,11 @@ def read_table(
     columns += [name for name in defaults if name not in columns]
     constants = [defaults[name] for name in columns[count:]]
     rows = []
-    plain = _PlainRows.create(columns, factors, texts, names, constants, absent, decimal)
     for line in islice(lines, 1, MOST_ROWS + 1):
         mark = Mark(file, line.number, 1)
         if len(messages) >= MOST_MESSAGES:
             messages.append(mark.message("", MORE_ERRORS))
             break
-        row = plain.row(mark, line)
-        if row is not None:
-            rows.append(row)
-            continue
         cells = line.cells()
         if cells is None or len(cells) != count:
             messages.append(mark.message("", wrong_count(line, cells, count)))
@@ -239,68 +230,6 @@ def _length_of(
         return absent
     cell_mark = Mark(mark.file, mark.line, cell[0])
     return read_number(cell[1], name, factors[name], cell_mark, messages, decimal=decimal)
-
-
-@dataclass(frozen=True)
-class _PlainRows:
-    """Reader of lines without quotation marks and errors, in a fraction of the time.
-
-    ``texts`` and ``lengths`` are indices of columns, the latter -1 for columns that are ``absent``
-    and with the unit's `power_of_ten`. ``constants`` are texts of missing columns, ``decimal`` is
-    the decimal sign. ``cache`` shares the texts of rows: few differ.
-    """
-
-    count: int
-    decimal: str
-    constants: list[str]
-    absent: float
-    texts: tuple[int, ...]
-    lengths: tuple[tuple[int, str], ...]
-    cache: dict[tuple[str, ...], tuple[str, ...]]
-
-    @classmethod
-    def create(
-        cls,
-        columns: Sequence[str],
-        factors: dict[str, Fraction],
-        texts: Sequence[str],
-        lengths: Sequence[str],
-        constants: list[str],
-        absent: float,
-        decimal: str,
-    ) -> _PlainRows:
-        by_name = {name: i for i, name in enumerate(columns)}
-        powers = [
-            (by_name.get(name, -1), power_of_ten(factors.get(name, Fraction(1))))
-            for name in lengths
-        ]
-        indices = tuple(by_name[name] for name in texts)
-        count = len(columns) - len(constants)
-        return cls(count, decimal, constants, absent, indices, tuple(powers), {})
-
-    def row(self, mark: Mark, line: TableLine) -> FileRow | None:
-        """Return the row of a line; None if it needs the thorough reader."""
-        if '"' in line.text:
-            return None
-        cells = [cell.strip() for cell in line.text.split(line.separator)]
-        if len(cells) != self.count:
-            return None
-        cells += self.constants
-        lengths = []
-        for i, power in self.lengths:
-            value = self.absent if i < 0 else plain_number(pointed(cells[i], self.decimal), power)
-            if value is None:
-                return None
-            lengths.append(value)
-        named = tuple(cells[i] for i in self.texts)
-        texts = self.cache.get(named)
-        if texts is None:
-            if not all(named):
-                return None
-            texts = tuple(map(text_of_cell, named))
-            if len(self.cache) < MOST_CACHED:
-                self.cache[named] = texts
-        return FileRow(mark, texts, tuple(lengths))
 
 
 def pointed(cell: str, decimal: str) -> str:

@@ -63,20 +63,20 @@ def explain(errors: list[ErrorDetails], node: Node, schema: Schema) -> list[Expl
     choices: dict[Steps, dict[str, list[tuple[Explanation, bool]]]] = {}
     # More than `MOST_MESSAGES` are not reported.
     for error in errors[: 2 * MOST_MESSAGES]:
-        location = _location(error, node)
+        steps, wrong, choice = _location(error, node)
         # Pydantic counts invalid entries as missing.
-        items = getattr(location.node, "items", ())
+        items = getattr(wrong, "items", ())
         if error["type"] == "too_short" and items and len(items) >= error["ctx"]["min_length"]:
             continue
-        explanation = _explain(error, location, node, schema)
-        if location.choice is None:
+        explanation = _explain(error, steps, wrong, node, schema)
+        if choice is None:
             explanations.append(explanation)
             continue
-        above, label = location.choice
+        above, label = choice
         # The choice fails because of the form that was written, not because of an error within it.
         is_other_form = explanation.steps == above and (
             error["type"] in EXPECTED
-            or (error["type"] == "literal_error" and not isinstance(location.node, Scalar))
+            or (error["type"] == "literal_error" and not isinstance(wrong, Scalar))
         )
         choices.setdefault(above, {}).setdefault(label, []).append((explanation, is_other_form))
     for by_label in choices.values():
@@ -101,16 +101,10 @@ def _nearest_choice(choices: list[list[tuple[Explanation, bool]]]) -> list[Expla
     ]
 
 
-@dataclass(frozen=True)
-class _Location:
-    steps: Steps
-    # The node at the path, or above it if the last step does not exist.
-    node: Node
-    # The path at which one of several forms was tried, and that form.
-    choice: tuple[Steps, str] | None
-
-
-def _location(error: ErrorDetails, root: Node) -> _Location:
+def _location(error: ErrorDetails, root: Node) -> tuple[Steps, Node, tuple[Steps, str] | None]:
+    """Return the path of an error, its node, or the one above if the last step does not exist, and
+    the path at which one of several forms was tried, with that form.
+    """
     steps: Steps = ()
     node, choice, tagged = root, None, False
     for i, step in enumerate(error["loc"]):
@@ -127,7 +121,7 @@ def _location(error: ErrorDetails, root: Node) -> _Location:
             steps = (*steps, step)
         elif choice is None and step != "[key]":
             choice = (steps, str(step))
-    return _Location(steps, node, choice)
+    return steps, node, choice
 
 
 def _kind(node: Node) -> str | None:
@@ -135,8 +129,10 @@ def _kind(node: Node) -> str | None:
     return str(kind.value) if isinstance(kind, Scalar) else None
 
 
-def _explain(error: ErrorDetails, location: _Location, root: Node, schema: Schema) -> Explanation:
-    kind, context, steps, node = error["type"], error.get("ctx", {}), location.steps, location.node
+def _explain(
+    error: ErrorDetails, steps: Steps, node: Node, root: Node, schema: Schema
+) -> Explanation:
+    kind, context = error["type"], error.get("ctx", {})
     value = (
         to_python(node) if isinstance(node, Scalar) else () if isinstance(node, Sequence) else {}
     )
@@ -145,7 +141,7 @@ def _explain(error: ErrorDetails, location: _Location, root: Node, schema: Schem
             return Explanation(steps[:-1], _wrong_length(root, steps[:-1], schema))
         note = _description(schema, root, steps)
         return Explanation(steps, f'missing; add "{steps[-1]}"{note}')
-    if kind == "extra_forbidden":
+    if kind == "extra_forbidden" or (kind == "literal_error" and error["loc"][-1:] == ("[key]",)):
         return _unknown_key(steps, root, schema)
     if isinstance(node, Scalar) and node.value is None:
         return Explanation(steps, "empty; give a value, or leave it out")
@@ -193,7 +189,9 @@ def _explain(error: ErrorDetails, location: _Location, root: Node, schema: Schem
 
 def _unknown_key(steps: Steps, root: Node, schema: Schema) -> Explanation:
     keys = [
-        key for part in _schemas_at(schema, root, steps[:-1]) for key in part.get("properties", {})
+        key
+        for part in _schemas_at(schema, root, steps[:-1])
+        for key in part.get("properties", part.get("propertyNames", {}).get("enum", ()))
     ]
     used = written_keys(root, *steps[:-1])
     free = [key for key in dict.fromkeys(keys) if key not in used]

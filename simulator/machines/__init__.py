@@ -9,9 +9,8 @@ from ballplate.simulator.inputs.faces import lazily
 # Public names of this package: extensions import these alone, and its modules are private.
 if TYPE_CHECKING:
     from .arrangement import ARRANGEMENTS, AXES, Arrangement
-    from .bases import Basis
-    from .curves import Points, SmoothedPoints
-    from .custom import CustomModelError, module_source
+    from .curves import Points
+    from .custom import module_source
     from .description import (
         Combination,
         MachineDescription,
@@ -20,11 +19,10 @@ if TYPE_CHECKING:
         reference_functions,
         true_volumetric,
     )
-    from .empirical import USUAL_OFFSET, EmpiricalModel
     from .empirical_settings import EmpiricalSettings
     from .error_names import SQUARENESS_ERRORS, SquarenessError
-    from .kinematic import ErrorFunction, KinematicModel, error_function
-    from .kinematic_settings import FunctionsSettings, KinematicSettings
+    from .kinematic import KinematicModel, error_function
+    from .kinematic_settings import KinematicSettings
     from .model_kinds import Corner, ErrorModelKind
     from .plane import PlaneModel
     from .protocol import (
@@ -38,19 +36,13 @@ if TYPE_CHECKING:
         Unit,
     )
     from .settings import (
-        ErrorModelSettings,
-        MachineFileSettings,
         PythonSettings,
         build_error_model,
-        kind_of,
-        with_defaults,
     )
     from .volumetric import (
-        SQUARENESS,
         VolumetricModel,
         meaning,
         squareness_field,
-        symbol,
         thermal_field,
     )
 

@@ -105,8 +105,13 @@ class SingleFunction:
 
 
 @dataclass(frozen=True)
-class _Polynomials:
-    """Polynomials with `coefficients` coefficients, the constant included."""
+class Polynomial:
+    """Polynomials with `coefficients` coefficients, the constant included: t T_k(2t - 1), or t (1 -
+    t) T_k(2t - 1), with T_k the Chebyshev polynomials, stable at any degree.
+
+    >>> Polynomial(5).size, Polynomial(5, zero_at_one=True).size
+    (4, 3)
+    """
 
     coefficients: int
     zero_at_one: bool = False
@@ -118,12 +123,7 @@ class _Polynomials:
 
     def interior(self) -> Basis:
         """Return the functions that vanish at both ends."""
-        whole: Basis = replace(self, zero_at_one=True)  # type: ignore[assignment]
-        return whole
-
-    @property
-    def monomials(self) -> Array:
-        raise NotImplementedError
+        return replace(self, zero_at_one=True)
 
     def quoted(self, variable: str = "t") -> Quoted:
         """Return coefficients of t, t^2, ..."""
@@ -138,16 +138,6 @@ class _Polynomials:
         matrix[0, 0] = matrix[1, 1] = 1.0
         matrix[1 : len(inner) + 1, 2:] = inner
         return Quoted(("", *(power(variable, k) for k in range(1, len(matrix)))), matrix)
-
-
-@dataclass(frozen=True)
-class Polynomial(_Polynomials):
-    """t T_k(2t - 1), or t (1 - t) T_k(2t - 1), with T_k the Chebyshev polynomials: stable at any
-    degree.
-
-    >>> Polynomial(5).size, Polynomial(5, zero_at_one=True).size
-    (4, 3)
-    """
 
     def values(self, t: Array) -> Array:
         """Return the functions at t (m,), as (m, size)."""
@@ -183,7 +173,7 @@ class Polynomial(_Polynomials):
 
 
 @dataclass(frozen=True)
-class Monomial(_Polynomials):
+class Monomial(Polynomial):
     """t^k from k = 1, or t^k (1 - t).
 
     >>> Monomial(4).values(np.array([0.5])), Monomial(4, zero_at_one=True).values(np.array([0.5]))

@@ -7,7 +7,7 @@ are not zero at the far end, therefore belong to another frame than estimated mo
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import ClassVar, Literal
 
@@ -29,79 +29,15 @@ NAMES = tuple(AXIS_ERRORS)
 
 @dataclass(frozen=True)
 class Points:
-    """A measured curve: values (m or rad) at ascending positions along the axis in metres."""
+    """A measured curve: values (m or rad) at ascending positions along the axis in metres.
+
+    With an `order`, degree plus one, its least-squares spline replaces it; `knots` are interior
+    knots in metres, without which the spline is one polynomial.
+    """
 
     positions: tuple[float, ...]
     values: tuple[float, ...]
-
-    def curve(self, interpolation: Interpolation, lower: float, upper: float) -> Curve:
-        """Return the function of t that is 0 at `lower` and 1 at `upper`, both in metres."""
-        # Positions may differ by less than fractions of a long axis can.
-        t, first = np.unique(
-            (np.array(self.positions) - lower) / (upper - lower), return_index=True
-        )
-        return Curve(tuple(t.tolist()), tuple(self.values[k] for k in first), interpolation)
-
-
-@dataclass(frozen=True)
-class Curve(SingleFunction):
-    """One function, through values at ascending t; constant beyond its ends.
-
-    >>> Curve((0.0, 1.0), (0.0, 2e-6), "linear").values(np.array([0.5, 1.2]))
-    array([[1.e-06],
-           [2.e-06]])
-    """
-
-    t: tuple[float, ...]
-    y: tuple[float, ...]
-    interpolation: Interpolation
-
-    kind: ClassVar[str] = "measured"
-
-    def values(self, t: Array) -> Array:
-        """Return the curve at t (m,), as (m, 1)."""
-        if self.interpolation == "linear" or len(self.t) < 3:
-            return np.interp(t, self.t, self.y)[:, None]
-        # SciPy takes longer to import than most experiments to check.
-        from scipy.interpolate import CubicSpline, PchipInterpolator
-
-        through = CubicSpline if self.interpolation == "cubic" else PchipInterpolator
-        return np.asarray(through(self.t, self.y)(np.clip(t, self.t[0], self.t[-1])))[:, None]
-
-
-@dataclass(frozen=True)
-class SmoothCurve(Curve):
-    """Polynomials fitted to the values.
-
-    `pieces` are coefficients of 1, u, u^2, … with u the distance in t from each of the `breaks`
-    except the last.
-    """
-
-    breaks: tuple[float, ...] = ()
-    pieces: tuple[tuple[float, ...], ...] = ()
-
-    kind: ClassVar[str] = "fitted"
-
-    def values(self, t: Array) -> Array:
-        """Return the polynomials at t (m,), as (m, 1)."""
-        clipped = np.clip(t, self.t[0], self.t[-1])
-        piece = np.clip(np.searchsorted(self.breaks, clipped, "right") - 1, 0, len(self.pieces) - 1)
-        u = clipped - np.asarray(self.breaks)[piece]
-        result = np.zeros(len(u))
-        for coefficients in np.asarray(self.pieces).T[::-1]:
-            result = result * u + coefficients[piece]
-        return result[:, None]
-
-
-@dataclass(frozen=True)
-class SmoothedPoints(Points):
-    """A measured curve, replaced by its least-squares spline.
-
-    `order` is degree plus one, `knots` are interior knots in metres; without knots the spline is
-    one polynomial.
-    """
-
-    order: int = 4
+    order: int = 0
     knots: tuple[float, ...] = ()
 
     @cached_property
@@ -113,21 +49,65 @@ class SmoothedPoints(Points):
         space = SplineSpace(self.order, self.positions[0], self.positions[-1], self.knots)
         return fit(space, np.asarray(self.positions), np.asarray(self.values))
 
-    def curve(self, interpolation: Interpolation, lower: float, upper: float) -> SmoothCurve:
-        """Return the fitted function of t that is 0 at `lower` and 1 at `upper`, both in metres.
+    def curve(self, interpolation: Interpolation, lower: float, upper: float) -> Curve:
+        """Return the function of t that is 0 at `lower` and 1 at `upper`, both in metres.
 
-        :raises SplineError: the points do not determine it.
+        :raises SplineError: the points do not determine a spline.
         """
-        fitted, length = pieces(self.fitted), upper - lower
+        length = upper - lower
+        # Positions may differ by less than fractions of a long axis can.
+        t, first = np.unique((np.array(self.positions) - lower) / length, return_index=True)
+        curve = Curve(tuple(t.tolist()), tuple(self.values[k] for k in first), interpolation)
+        if not self.order:
+            return curve
         powers = length ** np.arange(self.order)
-        plain = super().curve(interpolation, lower, upper)
-        return SmoothCurve(
-            plain.t,
-            plain.y,
-            interpolation,
-            tuple(((fitted.breaks - lower) / length).tolist()),
-            tuple(map(tuple, (fitted.coefficients * powers).tolist())),
+        return replace(
+            curve,
+            breaks=tuple(((self.fitted.space.breaks - lower) / length).tolist()),
+            pieces=tuple(map(tuple, (pieces(self.fitted) * powers).tolist())),
         )
+
+
+@dataclass(frozen=True)
+class Curve(SingleFunction):
+    """One function, through values at ascending t, or polynomials fitted to them; constant beyond
+    its ends.
+
+    `pieces` are coefficients of 1, u, u^2, … with u the distance in t from each of the `breaks`
+    except the last.
+
+    >>> Curve((0.0, 1.0), (0.0, 2e-6), "linear").values(np.array([0.5, 1.2]))
+    array([[1.e-06],
+           [2.e-06]])
+    """
+
+    t: tuple[float, ...]
+    y: tuple[float, ...]
+    interpolation: Interpolation
+    breaks: tuple[float, ...] = ()
+    pieces: tuple[tuple[float, ...], ...] = ()
+
+    kind: ClassVar[str] = "measured"
+
+    def values(self, t: Array) -> Array:
+        """Return the curve at t (m,), as (m, 1)."""
+        if self.pieces:
+            return self._fitted_values(np.clip(t, self.t[0], self.t[-1]))[:, None]
+        if self.interpolation == "linear" or len(self.t) < 3:
+            return np.interp(t, self.t, self.y)[:, None]
+        # SciPy takes longer to import than most experiments to check.
+        from scipy.interpolate import CubicSpline, PchipInterpolator
+
+        through = CubicSpline if self.interpolation == "cubic" else PchipInterpolator
+        return np.asarray(through(self.t, self.y)(np.clip(t, self.t[0], self.t[-1])))[:, None]
+
+    def _fitted_values(self, t: Array) -> Array:
+        piece = np.clip(np.searchsorted(self.breaks, t, "right") - 1, 0, len(self.pieces) - 1)
+        u = t - np.asarray(self.breaks)[piece]
+        result = np.zeros(len(u))
+        for coefficients in np.asarray(self.pieces).T[::-1]:
+            result = result * u + coefficients[piece]
+        return result
 
 
 def curves_model(

@@ -17,7 +17,14 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..inputs.module_finder import own_modules
-from ..inputs.own_code import error_text, own_array, own_frame, own_result, running_own_code
+from ..inputs.own_code import (
+    OwnCodeError,
+    error_text,
+    own_array,
+    own_frame,
+    own_result,
+    running_own_code,
+)
 from ..inputs.quantities import with_quantities
 from ..inputs.settings import hint, listing
 from ..inputs.trust import Trust
@@ -27,18 +34,10 @@ from .protocol import Array, ErrorModel, Line, Parameter, Reported
 GROUP = "ballplate.error_models"
 MEMBERS = ("dimension", "parameters", "error", "jacobian", "reported")
 
-# Former names of ballplate's packages, and the line that replaces their imports in old models.
-FORMER_PACKAGES = ("simulator", "analysis")
-NEW_LINE = "from ballplate.models import Parameter, Reported"
-
-# Parameters are tried at random values that move points by about this much, in metres, and are
-# changed by as much.
+# Parameters are tried at values that move points by about this much, in metres.
 USUAL_ERROR = 1e-4
 # Errors beyond it, in metres, are those of no machine.
 IMPLAUSIBLE = 0.1
-# Largest difference of a derivative from the quotient of differences, in parts of the parameter's
-# stated effect.
-DERIVATIVE = 1e-4
 
 Result = TypeVar("Result")
 
@@ -172,12 +171,6 @@ def _imported(name: str, folder: Path | None) -> Any:
         module = attempt(f"{name} cannot be imported", lambda: importlib.import_module(name))
     except CustomModelError as error:
         absent = error.__cause__.name if isinstance(error.__cause__, ModuleNotFoundError) else None
-        if absent is not None and absent.partition(".")[0] in FORMER_PACKAGES:
-            text = (
-                f"{name} imports {absent}, which is no longer a package of its own; write:"
-                f" {NEW_LINE}"
-            )
-            raise CustomModelError(text) from None
         if absent in name.split("."):
             where = "" if folder is None else f" nor in {folder}"
             raise CustomModelError(
@@ -244,6 +237,8 @@ def attempt(failure: str, call: Callable[[], Result], key: str = "object") -> Re
             return call()
     except CustomModelError:
         raise
+    except OwnCodeError as error:
+        raise CustomModelError(f"{failure}: {error}", key) from error
     except (Exception, SystemExit) as error:
         # Without a frame in the user's code, the call itself is at fault.
         text = error_text(error, own_frame(error))
@@ -270,57 +265,7 @@ def _checked(name: str, model: Any, lower: Array, upper: Array) -> ErrorModel:
         )
     parameters = attempt(f"{name}: parameters has failed", lambda: tuple(model.parameters))
     _check_parameters(name, parameters)
-    generator = np.random.default_rng(np.random.SeedSequence(1))
-    x = lower + (upper - lower) * generator.random((7, d))
-    p = 0.05 * float((upper - lower).max()) * generator.standard_normal((7, d))
-    effect = np.array([parameter.effect for parameter in parameters])
     n = len(parameters)
-
-    def values(call_text: str, call: Callable[[], Any], shape: tuple[int, ...]) -> Array:
-        returned = np.asarray(attempt(f"{name}: {call_text} has failed", call))
-        if returned.shape != shape:
-            raise CustomModelError(
-                f"{name}: {call_text} returns the shape {returned.shape}; return {shape}"
-            )
-        if returned.dtype.kind not in "fiu" or not np.isfinite(returned).all():
-            raise CustomModelError(
-                f"{name}: {call_text} returns values that are not finite numbers"
-            )
-        return np.asarray(returned, float)
-
-    without = values("error(x, 0, p)", lambda: model.error(x, np.zeros(n), p), (7, d))
-    if np.abs(without - p).max() > 1e-12:
-        raise CustomModelError(
-            f"{name}: error(x, 0, p) is not p; without errors the correction is the probe offset"
-        )
-    a = USUAL_ERROR / effect * generator.standard_normal(n)
-    jacobian = values("jacobian(x, a, p)", lambda: model.jacobian(x, a, p), (7, d, n))
-    first, second = (
-        attempt(f"{name}: jacobian has failed", lambda: model.jacobian(x, a, p)) for _ in range(2)
-    )
-    if (
-        not isinstance(first, np.ndarray)
-        or first.dtype != float
-        or not first.flags.writeable
-        or np.shares_memory(first, second)
-    ):
-        raise CustomModelError(
-            f"{name}: jacobian returns no new array of floats; make one at each call"
-        )
-    for k, parameter in enumerate(parameters):
-        step = np.zeros(n)
-        step[k] = USUAL_ERROR / effect[k]
-        after = values("error(x, a, p)", lambda step=step: model.error(x, a + step, p), (7, d))  # type: ignore[misc]
-        before = values("error(x, a, p)", lambda step=step: model.error(x, a - step, p), (7, d))  # type: ignore[misc]
-        quotient = (after - before) / (2.0 * step[k])
-        if np.abs(jacobian[:, :, k] - quotient).max() > DERIVATIVE * effect[k]:
-            worst = np.unravel_index(np.abs(jacobian[:, :, k] - quotient).argmax(), quotient.shape)
-            raise CustomModelError(
-                f'{name}: jacobian is not the derivative of error by "{parameter.name}":'
-                f" {jacobian[(*worst, k)]:.6g} "
-                f"instead of {quotient[worst]:.6g} in {'xyz'[int(worst[1])]}, at x ="
-                f" {x[worst[0]].round(4).tolist()}"
-            )
     reported = attempt(f"{name}: reported has failed", model.reported)
     shape = np.asarray(getattr(reported, "matrix", 0.0)).shape
     if (
@@ -331,7 +276,12 @@ def _checked(name: str, model: Any, lower: Array, upper: Array) -> ErrorModel:
             f"{name}: reported() has a matrix of shape {shape}; one row for each name is needed"
         )
     kind = GuardedModelWithLines if hasattr(model, "lines") else GuardedModel
-    return kind(model, d, parameters, reported)
+    guarded = kind(model, d, parameters, reported)
+    x = np.linspace(lower, upper, 7)
+    for a in (np.zeros(n), USUAL_ERROR / np.array([one.effect for one in parameters])):
+        guarded.error(x, a, np.zeros_like(x))
+        guarded.jacobian(x, a, np.zeros_like(x))
+    return guarded
 
 
 def _check_parameters(name: str, parameters: tuple[Any, ...]) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 
 from .arrangement import Arrangement
 from .bases import Basis, Polynomial, SingleFunction, Spline
-from .curves import Curve, Interpolation, Points, SmoothedPoints
+from .curves import Curve, Interpolation, Points
 from .error_names import AXIS_ERRORS, ROTATIONS, SQUARENESS_ERRORS, TRANSLATIONS, AxisError
 from .kinematic import KinematicModel, carried_vectors, error_function
 from .protocol import Array, TrueMachine
@@ -385,7 +385,7 @@ def fitted_volumetric(
         if error.shape is None:
             continue
         basis: Basis
-        if isinstance(error.shape, SmoothedPoints):
+        if isinstance(error.shape, Points) and error.shape.order:
             low, high = lower[error.axis], upper[error.axis]
             inside = [knot for knot in error.shape.knots if low < knot < high]
             basis = Polynomial(error.shape.order)

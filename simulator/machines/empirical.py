@@ -52,10 +52,6 @@ LEVELS = (0.0, 0.25, 0.5, 0.75, 1.0)
 AXES = ("x", "y", "z")
 
 
-class FrameError(ValueError):
-    """The terms cannot be held at zero at a corner by omitting one term."""
-
-
 @dataclass(frozen=True)
 class EmpiricalModel:
     """e(x, a, p) of six functions in the same `terms`, each with its free `columns`.
@@ -213,7 +209,7 @@ def empirical_model(
 
     Terms that are not zero there are omitted.
 
-    :raises FrameError: a condition has several such terms.
+    :raises ValueError: a condition has several such terms.
 
     >>> from .bases import Polynomial
     >>> from .terms import sums
@@ -228,7 +224,7 @@ def empirical_model(
                 at_corner = own_terms.values(np.array([corner]))[0, columns_left]
                 touched = np.flatnonzero(np.abs(at_corner) > 1e-9)
                 if len(touched) > 1:
-                    raise FrameError(f"{len(touched)} terms of {function} are not zero at {corner}")
+                    raise ValueError(f"{len(touched)} terms of {function} are not zero at {corner}")
                 columns_left = [column for k, column in enumerate(columns_left) if k not in touched]
         columns.append(tuple(columns_left))
     return EmpiricalModel(terms, tuple(columns), lower, upper, full_rotations, of_rotations)

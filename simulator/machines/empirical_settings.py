@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Annotated, Any, Literal, Self
 
-import numpy as np
 from pydantic import ConfigDict, Discriminator, Field, Tag, model_validator
 
 from ..inputs.settings import Forms, Settings
 from .bases import Basis
 from .basis_settings import BASIS, BasisSettings, SplineSettings, basis_of, without
-from .empirical import FrameError, empirical_model
+from .empirical import empirical_model
 from .model_kinds import Corner, ErrorModelKind
 from .protocol import ErrorModel
 from .terms import (
@@ -65,7 +64,7 @@ class RadialSettings(Settings):
             without(self, ("constant",), f"the function {self.function}")
         try:
             empirical_model(self.terms(), (0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
-        except (FrameError, np.linalg.LinAlgError):
+        except ValueError:  # That of singular matrices, too.
             raise ValueError(
                 "these functions are too similar to be distinguished; give fewer centres or a"
                 " smaller constant"

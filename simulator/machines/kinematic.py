@@ -18,7 +18,7 @@ from .arrangement import AXES, Arrangement
 from .bases import Basis, Polynomial, Quoted, SingleFunction
 from .error_names import AXIS_ERRORS, SQUARENESS_ERRORS, AxisError, SquarenessError
 from .protocol import Array, Line, Parameter, Reported
-from .rigid_chain import RigidChain
+from .rigid_chain import rigid_chain
 
 # Straightness held at zero at the far end, so that the frame's axes are those of the machine: the x
 # axis gives the direction of x, and the plane of the x and y axes is the xy plane (NPL section
@@ -153,7 +153,10 @@ class KinematicModel:
         translation, rotation = self.motions(x, a)
         from_origin = x - np.asarray(self.lower if self.origin is None else self.origin)
         if self.full_rotations:
-            return RigidChain(self.arrangement, from_origin, translation, rotation, p).error()
+            return (
+                rigid_chain(self.arrangement, from_origin, translation, rotation, p)[0]
+                - from_origin
+            )
         carried = carried_vectors(self.arrangement, from_origin, p)
         moved = translation.sum(axis=1) + p
         for axis, (sign, vector) in enumerate(carried):
@@ -165,9 +168,9 @@ class KinematicModel:
         from_origin = x - np.asarray(self.lower if self.origin is None else self.origin)
         if self.full_rotations:
             translation, rotation = self._motions(bases, a, len(x))
-            by_translation, by_rotation = RigidChain(
+            _, by_translation, by_rotation = rigid_chain(
                 self.arrangement, from_origin, translation, rotation, p
-            ).sensitivities()
+            )
         else:
             carried = carried_vectors(self.arrangement, from_origin, p)
         result = np.zeros((len(x), 3, len(self.parameters)), np.result_type(x, a, p, float))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from .arrangement import AXES, Arrangement
@@ -33,70 +31,54 @@ def rotation_and_derivatives(angles: Array) -> tuple[Array, list[Array]]:
     return plain[2] @ plain[1] @ plain[0], derivatives
 
 
-@dataclass(frozen=True)
-class RigidChain:
-    """Rigid-body product of all axes: the position of the probe's tip in the frame of the
-    table.
+def rigid_chain(
+    arrangement: Arrangement, x: Array, translation: Array, rotation: Array, p: Array
+) -> tuple[Array, list[Array], list[Array]]:
+    """Return the rigid-body product of all axes: the positions (m, 3) of the probe's tip in the
+    frame of the table, and their derivatives by each axis's translation and rotation, by axis (m,
+    3, 3).
     """
+    m = len(x)
+    dtype = np.result_type(x, translation, p)
+    by_translation = [np.zeros((0,))] * 3
+    by_rotation = [np.zeros((0,))] * 3
 
-    arrangement: Arrangement
-    x: Array
-    translation: Array
-    rotation: Array
-    p: Array
+    def step(axis: int) -> Array:
+        displaced = translation[:, axis].astype(dtype, copy=True)
+        displaced[:, axis] += x[:, axis]
+        return displaced
 
-    def _walk(self) -> tuple[Array, list[Array], list[Array]]:
-        m = len(self.x)
-        dtype = np.result_type(self.x, self.translation, self.p)
-        by_translation = [np.zeros((0,))] * 3
-        by_rotation = [np.zeros((0,))] * 3
+    def turned(matrix: Array, vector: Array) -> Array:
+        return np.einsum("mij,mj->mi", matrix, vector)
 
-        def step(axis: int) -> Array:
-            displaced = self.translation[:, axis].astype(dtype, copy=True)
-            displaced[:, axis] += self.x[:, axis]
-            return displaced
+    tip = p.astype(dtype, copy=True)
+    on_probe_side = [AXES.index(name) for name in arrangement.probe_side]
+    for axis in reversed(on_probe_side):
+        matrix, derivatives = rotation_and_derivatives(rotation[:, axis])
+        by_rotation[axis] = np.stack([turned(d, tip) for d in derivatives], axis=2)
+        tip = step(axis) + turned(matrix, tip)
+    prefix = np.broadcast_to(np.eye(3, dtype=dtype), (m, 3, 3))
+    for axis in on_probe_side:
+        by_translation[axis] = prefix
+        by_rotation[axis] = prefix @ by_rotation[axis]
+        prefix = prefix @ rotation_and_derivatives(rotation[:, axis])[0]
 
-        def turned(matrix: Array, vector: Array) -> Array:
-            return np.einsum("mij,mj->mi", matrix, vector)
-
-        tip = self.p.astype(dtype, copy=True)
-        on_probe_side = [AXES.index(name) for name in self.arrangement.probe_side]
-        for axis in reversed(on_probe_side):
-            matrix, derivatives = rotation_and_derivatives(self.rotation[:, axis])
-            by_rotation[axis] = np.stack([turned(d, tip) for d in derivatives], axis=2)
-            tip = step(axis) + turned(matrix, tip)
-        prefix = np.broadcast_to(np.eye(3, dtype=dtype), (m, 3, 3))
-        for axis in on_probe_side:
-            by_translation[axis] = prefix
-            by_rotation[axis] = prefix @ by_rotation[axis]
-            prefix = prefix @ rotation_and_derivatives(self.rotation[:, axis])[0]
-
-        # The table moves the other way: going outwards, undo each axis's displacement, then its
-        # rotation.
-        passed = list(on_probe_side)
-        for name in self.arrangement.workpiece_side:
-            axis = AXES.index(name)
-            matrix, derivatives = rotation_and_derivatives(self.rotation[:, axis])
-            back = matrix.transpose(0, 2, 1)
-            outside = tip + step(axis)
-            by_translation[axis] = np.broadcast_to(np.eye(3, dtype=dtype), (m, 3, 3))
-            by_rotation[axis] = np.zeros((m, 3, 3), dtype)
-            for earlier in [*passed, axis]:
-                by_translation[earlier] = back @ by_translation[earlier]
-                by_rotation[earlier] = back @ by_rotation[earlier]
-            by_rotation[axis] = np.stack(
-                [turned(d.transpose(0, 2, 1), outside) for d in derivatives], axis=2
-            )
-            tip = turned(back, outside)
-            passed.append(axis)
-        return tip, by_translation, by_rotation
-
-    def error(self) -> Array:
-        return self._walk()[0] - self.x
-
-    def sensitivities(self) -> tuple[list[Array], list[Array]]:
-        """Return derivatives of the tip by each axis's translation and rotation, by axis (m, 3,
-        3).
-        """
-        _, by_translation, by_rotation = self._walk()
-        return by_translation, by_rotation
+    # The table moves the other way: going outwards, undo each axis's displacement, then its
+    # rotation.
+    passed = list(on_probe_side)
+    for name in arrangement.workpiece_side:
+        axis = AXES.index(name)
+        matrix, derivatives = rotation_and_derivatives(rotation[:, axis])
+        back = matrix.transpose(0, 2, 1)
+        outside = tip + step(axis)
+        by_translation[axis] = np.broadcast_to(np.eye(3, dtype=dtype), (m, 3, 3))
+        by_rotation[axis] = np.zeros((m, 3, 3), dtype)
+        for earlier in [*passed, axis]:
+            by_translation[earlier] = back @ by_translation[earlier]
+            by_rotation[earlier] = back @ by_rotation[earlier]
+        by_rotation[axis] = np.stack(
+            [turned(d.transpose(0, 2, 1), outside) for d in derivatives], axis=2
+        )
+        tip = turned(back, outside)
+        passed.append(axis)
+    return tip, by_translation, by_rotation

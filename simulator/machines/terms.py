@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
 
@@ -20,21 +20,6 @@ from .bases import Basis, Monomial, Quoted, Spline, whole_values
 from .protocol import Array
 
 VARIABLES = ("x", "y", "z")
-
-
-class Terms(Protocol):
-    """Linearly independent functions of a position."""
-
-    @property
-    def names(self) -> tuple[str, ...]: ...
-
-    def values(self, t: Array) -> Array:
-        """Return the functions at scaled positions t (m, 3), as (m, number of functions)."""
-        ...
-
-    def quoted(self) -> Quoted:
-        """Return the functions in the form usual in the field."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -69,6 +54,7 @@ class Products:
         return tuple([indices[axis] for indices in self.factors] for axis in range(3))
 
     def values(self, t: Array) -> Array:
+        """Return the functions at scaled positions t (m, 3), as (m, number of functions)."""
         result = whole_values(self.axes[0], t[:, 0])[:, self._by_axis[0]]
         for axis in (1, 2):
             result *= whole_values(self.axes[axis], t[:, axis])[:, self._by_axis[axis]]
@@ -251,6 +237,7 @@ class Radial:
         return radial, np.linalg.solve(r[:4], q[:, :4].T @ (np.eye(len(kernel)) - kernel @ radial))
 
     def values(self, t: Array) -> Array:
+        """Return the functions at scaled positions t (m, 3), as (m, number of functions)."""
         kernel, linear = self._functions(t)
         radial, polynomial = self._weights
         return kernel @ radial + linear @ polynomial
@@ -258,3 +245,7 @@ class Radial:
     def quoted(self) -> Quoted:
         """Return the values at the centres."""
         return Quoted(self.names, np.eye(len(self.names)))
+
+
+Terms = Products | Radial
+"""Linearly independent functions of a position."""

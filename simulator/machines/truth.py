@@ -9,7 +9,7 @@ from collections.abc import Collection
 import numpy as np
 
 from ..computing.decompositions import lstsq
-from ..inputs.quantities import QuantityError, parse_angle, parse_length, parse_ratio
+from ..inputs.quantities import PARSERS, QuantityError
 from ..inputs.settings import Settings, hint
 from .error_names import AXIS_ERRORS, SQUARENESS_ERRORS, AxisError
 from .framing import in_frame_of
@@ -24,8 +24,6 @@ from .true_machine_settings import (
     TrueMapSettings,
     ZeroSettings,
 )
-
-_PARSERS = {"m": parse_length, "rad": parse_angle, "1": parse_ratio}
 
 
 class TruthError(ValueError):
@@ -104,7 +102,7 @@ def _parameters_of_values(values: dict[str, str], model: ErrorModel) -> Array:
             )
             continue
         try:
-            targets[name] = _PARSERS[entry[0]](text)
+            targets[name] = PARSERS[entry[0]](text)
         except QuantityError as error:
             problems.append((name, str(error)))
     if problems:

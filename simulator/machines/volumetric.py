@@ -14,7 +14,7 @@ from itertools import product
 import numpy as np
 
 from .arrangement import AXES
-from .error_names import ERRORS, SQUARENESS_ERRORS, AxisError
+from .error_names import ERRORS, SQUARENESS_ERRORS
 from .kinematic import KinematicModel
 from .protocol import Array, Line, Parameter, Reported, Unit
 
@@ -149,19 +149,6 @@ class VolumetricModel:
         """
         of_fields = self.parameters[len(self.chain.parameters) :]
         return self.chain.reported().beside(Reported.as_is(of_fields))
-
-
-def symbol(name: str) -> str:
-    """Return the symbol of Park, Burdekin and Peggs for an ISO 230-1 name.
-
-    >>> symbol("EXX"), symbol("EZY"), symbol("EBX"), symbol("EB0Z")
-    ('δx(x)', 'δz(y)', 'Ey(x)', '-β1')
-    """
-    error = ERRORS[name]
-    if not isinstance(error, AxisError):
-        return {"EC0Y": "α", "EB0Z": "-β1", "EA0Z": "β2"}[name]
-    axis, component = AXES[error.axis], AXES[error.component]
-    return f"E{component}({axis})" if error.is_rotation else f"δ{component}({axis})"
 
 
 def meaning(name: str) -> str:

@@ -10,12 +10,9 @@ from ballplate.simulator.inputs.faces import lazily
 if TYPE_CHECKING:
     from .fit_verdict import LackOfFit, verdict_data, verdict_line
     from .fitted_map import (
-        CONVERSION,
         FittedMap,
         InCommon,
-        LeftOut,
         MapData,
-        determined_only,
         readings_in_common,
     )
 

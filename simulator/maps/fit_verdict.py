@@ -92,10 +92,8 @@ class LackOfFit:
         return f"in the fit of the map, {'; '.join(reasons)}" if reasons else ""
 
 
-def verdict_of(lack: LackOfFit | None) -> str:
-    """Return the short verdict on a map's fit; empty for maps of earlier versions."""
-    if lack is None:
-        return "not stated"
+def verdict_of(lack: LackOfFit) -> str:
+    """Return the short verdict on a map's fit."""
     if lack.is_beyond_limit:
         return "beyond the limit"
     if lack.is_significant:
@@ -103,17 +101,17 @@ def verdict_of(lack: LackOfFit | None) -> str:
     return "not significant" if lack.degrees_of_freedom > 0 else "not tested"
 
 
-def verdict_line(lack: LackOfFit | None, symbol: str = "the map") -> str:
+def verdict_line(lack: LackOfFit, symbol: str = "the map") -> str:
     """The verdict on a map's fit as a line of text."""
     line = f"lack of fit of {symbol}: {verdict_of(lack)}"
-    if lack is None or not lack.degrees_of_freedom:
+    if not lack.degrees_of_freedom:
         return line
     return f"{line} (S^2 is {lack.times:.3g} times what the stated uncertainties explain)"
 
 
-def verdict_data(lack: LackOfFit | None) -> dict[str, Any]:
+def verdict_data(lack: LackOfFit) -> dict[str, Any]:
     """The verdict on a map's fit as plain data."""
-    return {"verdict": verdict_of(lack), **({} if lack is None else verdict_content(lack))}
+    return {"verdict": verdict_of(lack), **verdict_content(lack)}
 
 
 def verdict_content(lack: LackOfFit) -> dict[str, Any]:

@@ -25,17 +25,14 @@ ROUNDING = 1e-13
 # What two campaigns have of each other's readings.
 InCommon = Literal["none", "some", "same"]
 
-# Kind of what a map leaves out that was converted from another error model.
-CONVERSION = "conversion"
-
 
 @dataclass(frozen=True)
 class LeftOut:
     """A parameter that a fit estimated and its map does not apply, such as one of an influence
-    quantity; or the residual of a converted map.
+    quantity.
 
-    `kind` is as in the estimates of a fit, or `CONVERSION`; `value` and `standard_uncertainty` are
-    in `unit`, None if undetermined.
+    `kind` is as in the estimates of a fit; `value` and `standard_uncertainty` are in `unit`, None
+    if undetermined.
     """
 
     name: str
@@ -74,7 +71,7 @@ class FittedMap:
     expanded uncertainties. `frame` describes the rigid motion that the model holds, `temperatures`
     are in degrees Celsius, and `left_out` are estimates of the fit that the map does not apply.
     `date` is that of the campaign, as 2026-11-22, if known. `sum_of_squares` is S^2 at the stated
-    uncertainties and `lack_of_fit` that of the fit, if the map states them.
+    uncertainties and `lack_of_fit` that of the fit.
     """
 
     title: str
@@ -90,17 +87,17 @@ class FittedMap:
     sigma: float
     sigma_is_estimated: bool
     degrees_of_freedom: int
+    sum_of_squares: float
+    lack_of_fit: LackOfFit
     repeatability: Array
     coverage_factor: float = 2.0
     frame: str = ""
     temperatures: Mapping[str, float] | None = None
     left_out: tuple[LeftOut, ...] = ()
     data: MapData | None = None
-    lack_of_fit: LackOfFit | None = None
     experiment: str = ""
     program: str = ""
     date: str | None = None
-    sum_of_squares: float | None = None
 
     def __repr__(self) -> str:
         open_ = self.undetermined.shape[1]
@@ -116,22 +113,6 @@ class FittedMap:
     def without_scatter(self) -> bool:
         """True if sigma, and with it the covariance, is zero except rounding."""
         return self.sigma_is_estimated and self.sigma < LEAST_SIGMA
-
-    @property
-    def known_lack_of_fit(self) -> LackOfFit:
-        """Basis of warnings: the stated lack of fit, or else the one that an estimated sigma
-        implies.
-        """
-        if self.lack_of_fit is not None:
-            return self.lack_of_fit
-        freedom = self.degrees_of_freedom if self.sigma_is_estimated else 0
-        return LackOfFit(self.sigma * self.sigma * freedom, freedom)
-
-    @property
-    def conversion_residual(self) -> float | None:
-        """Largest difference in metres of corrected points from the source of a converted map."""
-        residuals = [part.value for part in self.left_out if part.kind == CONVERSION]
-        return residuals[0] if residuals else None
 
     @cached_property
     def offset_columns(self) -> Integers:

@@ -21,15 +21,14 @@ LEAST = 1e-9
 class EarlierCampaign:
     """The campaign of a prior map: its `file`, and its statement on sigma.
 
-    `sum_of_squares` is S^2 at the stated uncertainties, None if unknown or rounding, and
-    `is_stated` is true if the map contains it. `caution` is the warning on the map's fit, if any.
+    `sum_of_squares` is S^2 at the stated uncertainties, None if it is rounding; `caution` the
+    warning on the map's fit, if any.
     """
 
     file: str
     sigma: float
     degrees_of_freedom: int
     sum_of_squares: float | None
-    is_stated: bool
     caution: str = ""
 
     @property
@@ -41,14 +40,11 @@ class EarlierCampaign:
 
 
 def campaign_of(fitted: FittedMap, file: str) -> EarlierCampaign:
-    """The campaign of a map; that of an older one whose sigma was estimated follows from that."""
-    squares, freedom = fitted.sum_of_squares, fitted.degrees_of_freedom
-    if squares is None and fitted.sigma_is_estimated:
-        squares = fitted.sigma * fitted.sigma * freedom
-    if squares is not None and squares < LEAST_SIGMA**2 * freedom:
-        squares = None
-    caution, is_stated = fitted.known_lack_of_fit.caution, fitted.sum_of_squares is not None
-    return EarlierCampaign(file, fitted.sigma, freedom, squares, is_stated, caution)
+    """The campaign of a map."""
+    freedom = fitted.degrees_of_freedom
+    is_rounding = fitted.sum_of_squares < LEAST_SIGMA**2 * freedom
+    squares = None if is_rounding else fitted.sum_of_squares
+    return EarlierCampaign(file, fitted.sigma, freedom, squares, fitted.lack_of_fit.caution)
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,9 @@ from ballplate.simulator.inputs.faces import lazily
 # Public names of this package: extensions import these alone, and its modules are private.
 if TYPE_CHECKING:
     from .fingerprints import position_fingerprints
-    from .generate import NoReadingError, exact_readings, scale_readings, true_readings
+    from .generate import NoReadingError, exact_readings, scale_readings
     from .given_points import ensure_points, probe_places
-    from .joining import joined, reading_keys
+    from .joining import joined
     from .observed_readings import ObservedReadings, observe
     from .reading_files import AXES, read_readings
     from .reading_sources import (

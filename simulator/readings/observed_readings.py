@@ -28,9 +28,7 @@ class ObservedReadings:
 
     `missing` names planned readings that the file lacks, `unplanned` further readings of the file.
     `marks` are the readings' locations, the first of averaged ones. `table_notes` describes the
-    reading of tables, and `redone` rows that later readings replace. `offset_doubts` are doubts
-    about probe offsets and equal part co-ordinates in tables, `certificate_doubts` about values of
-    a certificate.
+    reading of tables, `certificate_doubts` are doubts about values of a certificate.
     """
 
     design: Design
@@ -39,9 +37,7 @@ class ObservedReadings:
     unplanned: tuple[str, ...]
     marks: tuple[Mark, ...] = ()
     table_notes: tuple[str, ...] = ()
-    offset_doubts: tuple[str, ...] = ()
     certificate_doubts: tuple[str, ...] = ()
-    redone: tuple[str, ...] = ()
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -59,7 +55,7 @@ class ObservedReadings:
             doubts = (f"errors in readings were not looked for ({error})",)
         else:
             doubts = checks.doubts_about_readings(self.design, self.x, self.marks)
-        return (*self.certificate_doubts, *self.offset_doubts, *doubts)
+        return (*self.certificate_doubts, *doubts)
 
 
 def observe(design: Design, readings: Readings, x: Array) -> ObservedReadings:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TextIO
@@ -26,8 +26,6 @@ from .observed_readings import ObservedReadings, combine_standards
 from .reading_sources import Source, source_rows
 
 AXES = ("x", "y", "z")
-
-Thinning = Callable[[Sequence[FileRow], Design], tuple[tuple[FileRow, ...], tuple[str, ...]]]
 
 
 def reading_columns(design: Design, readings: Readings, x: Array) -> dict[str, list[Any]]:
@@ -59,7 +57,6 @@ def read_readings(
     design: Design,
     every_ball: bool = True,
     settings: ReadingsSettings | None = None,
-    thinned: Thinning | None = None,
 ) -> ObservedReadings:
     """Return readings of one or several files as observations of a design.
 
@@ -70,7 +67,7 @@ def read_readings(
     unplanned reading, the machine's repeatability; u_x, u_y and u_z are those of single
     co-ordinates. Influence quantities have further columns. A
     reading may occur as often as planned; an unplanned one, once. Without `every_ball`, some balls
-    may be unread. `thinned` selects rows and describes omitted ones (`redone`).
+    may be unread.
 
     The extension that reads other tables also checks that readings belong to their balls and their
     co-ordinates are of the stated type.
@@ -80,20 +77,16 @@ def read_readings(
     :raises MissingExtensionError: the settings need that extension.
     """
     d, settings = design.dimension, settings or no_settings()
-    stated_coordinates = settings.coordinates
     sources = [source] if isinstance(source, Path | GivenText) else list(source)
     messages: list[Message] = []
     beside_units = {name: unit for kind in design.influences for name, unit in kind.columns.items()}
     units = dict.fromkeys([f"u_{axis}" for axis in AXES[:d]], LENGTH_UNITS) | beside_units
     empty = AXES[:d] if design.positions.across is not None else ()
 
-    def is_possible(x: Array) -> bool:
-        return stated_coordinates == "part" or not design.machine.volume.far_outside(x).any()
-
-    table = source_rows(sources, design, settings, messages, is_possible, units, empty)
+    table = source_rows(sources, design, settings, messages, units, empty)
     # Reports state some settings themselves.
     settings = table.settings
-    rows, redone = thinned(table.rows, design) if thinned else (table.rows, ())
+    rows = table.rows
     index, unknown = _indices(rows, design)
     lengths = np.array([row.lengths for row in rows])
     coordinates, of_axes = lengths[:, :d], lengths[:, d + 1 : 2 * d + 1]
@@ -145,18 +138,14 @@ def read_readings(
         raise refused(
             sources[0], f"no reading of the balls {names}; read each at least once", line=1
         )
-    table_notes, doubt = (*table.notes, *swapped), tuple[str, ...]()
+    table_notes = (*table.notes, *swapped)
     checks = optional_service("ReadingChecks")
     if checks is not None:
-        uncertainties = uncertainty.max(axis=1) if has_uncertainty else None
-        doubt += checks.doubts_about_table(
-            design, readings, coordinates, uncertainties, settings, rows[0].mark
-        )
         table_notes += checks.said_of(settings)
     observed = combine_standards(design, readings, x, missing, unplanned, marks)
-    observed = replace(observed, table_notes=table_notes, offset_doubts=doubt, redone=redone)
+    observed = replace(observed, table_notes=table_notes)
     if checks is not None:
-        checks.refuse_gross_errors(observed.design, observed.x, observed.marks, settings)
+        checks.refuse_gross_errors(observed.design, observed.x, observed.marks)
     _refuse_repeated(rows, readings, design)
     return observed
 

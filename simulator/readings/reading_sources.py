@@ -6,7 +6,7 @@ An extension reads other layouts, reports and other names.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,7 +22,6 @@ from ..inputs.quantities import Units
 from ..inputs.settings import number_of
 from ..inputs.tables import FileRow, header_line, header_names, header_texts, read_table
 from ..inputs.yamltree import GivenText, read_bytes
-from ..machines.protocol import Array
 
 Source = Path | GivenText
 # Endings of workbooks, which an extension reads.
@@ -83,7 +82,6 @@ def source_rows(
     design: Design,
     settings: ReadingsSettings,
     messages: list[Message],
-    is_possible: Callable[[Array], bool],
     units: Units,
     empty: Collection[str] = (),
 ) -> SourceRows:
@@ -119,9 +117,7 @@ def source_rows(
             return SourceRows(tuple(rows), notes, settings)
     if reader is None:
         raise ExperimentError(errors) if errors else _not_plain(foreign[0])
-    matched: SourceRows = reader.of_sources(
-        tables, design, settings, messages, is_possible, units, empty
-    )
+    matched: SourceRows = reader.of_sources(tables, design, settings, messages, units, empty)
     return matched
 
 
@@ -160,9 +156,7 @@ def named_rows(
     reader = optional_service("OtherTables")
     if reader is None:
         raise ExperimentError(errors) if errors else _not_plain(table)
-    result = reader.of_table(
-        table, names, settings, messages, lambda x: False, dimension, {}, empty
-    )
+    result = reader.of_table(table, names, settings, messages, dimension, {}, empty)
     if messages:
         raise ExperimentError(messages)
     return tuple(result.rows)

@@ -10,9 +10,9 @@ from ballplate.simulator.inputs.faces import lazily
 
 # Public names of this package: extensions import these alone, and its modules are private.
 if TYPE_CHECKING:
-    from .constraints import Constraint, periodic, prescribed, straight
+    from .constraints import Constraint, straight
     from .knots import at_every, with_boundaries
-    from .polynomial_pieces import Pieces, Powers, pieces
+    from .polynomial_pieces import pieces
     from .space import Side, SplineSpace
     from .spline_fit import SplineFit, fit
     from .spline_problems import SplineError, SplineProblem

@@ -1,7 +1,7 @@
 """Least squares under constraints by orthogonal factorisation.
 
 The constraints C c = f are met by c = c0 + Z z, where C' P = Q R gives the particular solution c0
-and the columns Z of Q that C does not see; then || W (A Z z - (y - A c0)) || is made small by a
+and the columns Z of Q that C does not see; then || A Z z - (y - A c0) || is made small by a
 second factorisation. NISTIR 6517, equation (25), is the same solution by pseudo-inverses; Lawson
 and Hanson, Solving Least Squares Problems, chapter 20, has this.
 """
@@ -31,19 +31,15 @@ class SplineFit:
     """A fitted spline.
 
     `coefficients` (count,) are those of the B-splines of `space`; with `root` (count, free) their
-    covariance is sigma² root root'. x, y (m,) are the points, `uncertainties` (m,) those of y, all
-    1 if not stated: then `sigma` is a standard uncertainty, otherwise a factor. `redundant` are
-    constraints that the others imply.
+    covariance is sigma² root root'. x, y (m,) are the points, `sigma` the standard uncertainty of
+    one.
     """
 
     space: SplineSpace
-    constraints: tuple[Constraint, ...]
-    redundant: tuple[Constraint, ...]
     coefficients: Array = field(repr=False)
     root: Array = field(repr=False)
     x: Array = field(repr=False)
     y: Array = field(repr=False)
-    uncertainties: Array = field(repr=False)
 
     @property
     def free(self) -> int:
@@ -76,8 +72,8 @@ class SplineFit:
 
     @cached_property
     def sum_of_squares(self) -> float:
-        """Of residuals over uncertainties."""
-        return float(((self.residuals / self.uncertainties) ** 2).sum())
+        """Of the residuals."""
+        return float((self.residuals**2).sum())
 
     @property
     def sigma(self) -> float:
@@ -86,25 +82,14 @@ class SplineFit:
             return float("nan")
         return float(np.sqrt(self.sum_of_squares / self.degrees_of_freedom))
 
-    def violation(self, constraint: Constraint) -> float:
-        """By how much the curve misses a constraint, in the constraint's own unit."""
-        terms = constraint.terms
-        return float(
-            sum(t.factor * self.values(np.array([t.at]), t.derivative, t.side)[0] for t in terms)
-            - constraint.value
-        )
-
 
 def fit(
     space: SplineSpace,
     x: Array,
     y: Array,
-    uncertainties: Array | None = None,
     constraints: tuple[Constraint, ...] = (),
 ) -> SplineFit:
     """Return the spline that fits points x, y (m,) best among those that meet the constraints.
-
-    Points are weighted by the inverse squares of their `uncertainties` (m,), equally without any.
 
     :raises SplineError: contradictory constraints, points that do not determine the curve, or
         points beyond its ends; all faults of one sort at once.
@@ -112,30 +97,25 @@ def fit(
     from scipy.linalg import solve_triangular
 
     x, y = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
-    weights = (
-        np.ones(len(x)) if uncertainties is None else 1.0 / np.asarray(uncertainties, dtype=float)
-    )
-    particular, null, redundant = _constrained(space, constraints)
+    particular, null = _constrained(space, constraints)
     design = space.rows(x)
     _refuse_undetermined(space, x, design @ null, null)
-    q, r = np.linalg.qr(weights[:, None] * (design @ null))
-    free = solve_triangular(r, q.T @ (weights * (y - design @ particular)))
+    q, r = np.linalg.qr(design @ null)
+    free = solve_triangular(r, q.T @ (y - design @ particular))
     root = null @ solve_triangular(r, np.eye(len(r)))
-    coefficients = particular + null @ free
-    return SplineFit(space, constraints, redundant, coefficients, root, x, y, 1.0 / weights)
+    return SplineFit(space, particular + null @ free, root, x, y)
 
 
-def _constrained(
-    space: SplineSpace, constraints: tuple[Constraint, ...]
-) -> tuple[Array, Array, tuple[Constraint, ...]]:
-    """Return a solution (count,) of the constraints, the free directions (count, free), and
-    redundant constraints.
+def _constrained(space: SplineSpace, constraints: tuple[Constraint, ...]) -> tuple[Array, Array]:
+    """Return a solution (count,) of the constraints, and the free directions (count, free).
+
+    :raises SplineError: constraints that contradict others.
     """
     from scipy.linalg import qr, solve_triangular
 
     matrix, values = rows(space, constraints)
     if not constraints:
-        return np.zeros(space.count), np.eye(space.count), ()
+        return np.zeros(space.count), np.eye(space.count)
     q, r, order = qr(matrix.T, pivoting=True)
     rank = int((np.abs(np.diag(r)) > NOTHING).sum())
     determined_columns, free_columns = order[:rank], sorted(order[rank:].tolist())
@@ -148,13 +128,13 @@ def _constrained(
     if contradictory:
         raise SplineError(
             SplineProblem(
-                f"the {constraints[k].words} contradicts what else is prescribed; leave it out, or"
-                " add a knot",
-                constraints[k].places,
+                f"the {constraints[k].name} at {{0}} contradicts what else is prescribed; leave it"
+                " out, or add a knot",
+                (constraints[k].at,),
             )
             for k in contradictory
         )
-    return particular, q[:, rank:], tuple(constraints[k] for k in free_columns)
+    return particular, q[:, rank:]
 
 
 def _refuse_undetermined(space: SplineSpace, x: Array, design: Array, null: Array) -> None:

@@ -47,7 +47,7 @@ def judged(file: str, variant: str) -> Linearisation:
     ],
 )
 @given(seed=st.integers(0, 2**32 - 1))
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=5, deadline=None)
 def test_any_basis_of_what_is_open_gives_the_same_words(file: str, variant: str, seed: int) -> None:
     at = judged(file, variant)
     found = at.spectrum
@@ -68,7 +68,7 @@ def test_any_basis_of_what_is_open_gives_the_same_words(file: str, variant: str,
 
 
 @given(seed=st.integers(0, 2**32 - 1), target=st.sampled_from([2e-8, 4e-8]))
-@settings(max_examples=4, deadline=None)
+@settings(max_examples=2, deadline=None)
 def test_any_basis_of_equally_weak_directions_gives_the_same_words(
     seed: int, target: float
 ) -> None:

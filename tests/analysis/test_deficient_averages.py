@@ -4,16 +4,10 @@ from __future__ import annotations
 
 import io
 import math
-from pathlib import Path
 
 import ballplate as bp
 import numpy as np
 import pandas
-import pytest
-import yaml
-from ballplate.cli import main
-from ballplate.extensions.sweeps.report.results import best_and_worst, read_results
-from ballplate.extensions.sweeps.store import open_store
 from ballplate.results import planned_uncertainty
 from ballplate.simulator.estimation import linearise
 from ballplate.simulator.estimation.functions import displacements
@@ -75,56 +69,6 @@ def test_numbers_of_its_check() -> None:
     assert math.isnan(frame["U6 average, µm"][0]) and frame["U6 undetermined"][0] == 3
     assert any(line.endswith("; 3 of 6 distances undetermined") for line in checked.lines())
     assert checked.to_dict()["lengths"]["average"] is None
-
-
-def test_the_smallest_is_that_of_the_complete_design() -> None:
-    designs = {"part": design(PART), "whole": design(WHOLE)}
-    for statistic in ("average", "maximum"):
-        values = {name: getattr(bp.run(one)["U6"], statistic) for name, one in designs.items()}
-        assert pandas.Series(values).idxmin() == "whole"
-        assert not values["part"] < values["whole"]
-
-
-def test_numbers_of_a_sweep(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """The case of the complete design is the best, in the frame, in text and in CSV."""
-    experiment = bp.quickstart().with_({"evaluation.points": sections(())["evaluation.points"]})
-    names = [position.name for position in experiment.positions]
-    always = [names[k] for k in set(PART) & set(WHOLE)]
-    others = [name for k, name in enumerate(names) if k not in (*PART, *WHOLE)]
-    written = yaml.safe_load(Path("designs/quickstart.yaml").read_text(encoding="utf-8"))
-    written["positions"] = [one for one in written["positions"] if one["name"] not in others]
-    written["evaluation"]["points"] = sections(())["evaluation.points"]
-    (tmp_path / "base.yaml").write_text(yaml.safe_dump(written), encoding="utf-8")
-    subsets = {"sizes": [3], "always": always}
-    settings = {
-        "title": "two designs",
-        "base": "base.yaml",
-        "axes": {"read": {"path": "positions", "subsets": subsets}},
-        "record": ["U6"],
-    }
-    path = tmp_path / "sweep.yaml"
-    path.write_text(yaml.safe_dump(settings), encoding="utf-8")
-    assert main(["sweep", str(path), "--workers", "1", "-q"]) == 0
-    capsys.readouterr()
-    store = str(path.with_suffix(".sqlite"))
-    frame = bp.stored(store).to_frame()
-    assert len(frame) == 2
-    is_part = frame["U6_undetermined"] > 0
-    assert is_part.sum() == 1 and (frame["U6_count"] == 6).all()
-    assert (frame["U6_average_m"].isna() == is_part).all()
-    assert (frame["U6_maximum_m"].isna() == is_part).all()
-    assert not is_part[frame["U6_average_m"].idxmin()]
-    opened = open_store(Path(store))
-    best = best_and_worst(read_results(opened, 1))[0]
-    opened.close()
-    assert not is_part[frame["cell"] == best].any()
-    assert main(["sweep", "--report", store, "--format", "csv", "-o", "-"]) == 0
-    rows = [line.split(",")[2:] for line in capsys.readouterr().out.splitlines()]
-    *undetermined, given = rows[1]
-    assert undetermined == (["5", "0"] if is_part[0] else ["0", "5"])
-    assert f"cases {0 if is_part[0] else 1}: 5 undetermined directions" in given
-    for *values, _ in rows[2:4]:
-        assert [cell == "-" for cell in values] == is_part.tolist()
 
 
 def test_reach_of_a_deficient_design() -> None:

@@ -16,31 +16,6 @@ def fitted() -> bp.Fit:
     return bp.fit(bp.quickstart(), bp.simulate(bp.quickstart(), seed=2), monomials=True)
 
 
-def test_curves_are_sums_of_the_reported_monomials(fitted: bp.Fit) -> None:
-    values = {one.name: one.value for one in fitted.estimates}
-    covariance = fitted.covariance("machine")
-    curves = fitted.error_functions
-    assert len(curves) == 18
-    for one in curves:
-        own = [name for name in covariance if name.split()[0] == one.name]
-        powers = [int(name.partition("^")[2] or 1) for name in own]
-        rows = one.positions[:, None] ** powers
-        np.testing.assert_allclose(one.values, rows @ [values[name] for name in own], atol=1e-15)
-        block = covariance.loc[own, own].to_numpy()
-        # Where the constraints hold a curve at zero, its variance is rounding.
-        u = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", rows, block, rows), 0.0))
-        np.testing.assert_allclose(one.standard_uncertainties, u, rtol=1e-6, atol=1e-11)
-
-
-def test_curves_agree_with_corrected_points(fitted: bp.Fit) -> None:
-    curve = next(one for one in fitted.error_functions if one.name == "EZX")
-    points = np.zeros((len(curve.positions), 3))
-    points[:, 0] = curve.positions
-    # On the X axis no other error displaces along z a tip that is straight below the reference point.
-    moved = fitted.correct(points, "down").points - points - [0.0, 0.0, -0.05]
-    np.testing.assert_allclose(curve.values, moved[:, 2], atol=1e-15)
-
-
 def test_what_is_undetermined_has_no_curve() -> None:
     experiment = bp.load("designs/npl/6.1.1.yaml", "B")
     curves = bp.fit(experiment, bp.simulate(experiment, seed=1)).error_functions

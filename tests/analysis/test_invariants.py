@@ -9,16 +9,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ballplate.simulator.design.arrays import Design, State, nominal_state
+from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.design.parameters import SharedLayout
-from ballplate.simulator.estimation.gauss_newton import gauss_newton
-from ballplate.simulator.estimation.initial import initial_state
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from ballplate.simulator.inputs.quantities import LengthFunction, Target
-from ballplate.simulator.readings.generate import noisy_certificate, noisy_readings
 from ballplate.uncertainty.summaries import Quantity, uncertainties
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -55,14 +52,6 @@ def judged(
 ) -> tuple[dict[str, Quantity], Linearisation, SharedLayout]:
     at = linearise(design)
     return uncertainties(at, sigma), at, at.layout
-
-
-def test_all_uncertainties_are_in_proportion_to_sigma() -> None:
-    design = small_design()
-    one, twice = (judged(design, sigma)[0] for sigma in (1.0, 2.0))
-    for symbol, quantity in one.items():
-        assert twice[symbol].maximum == pytest.approx(2.0 * quantity.maximum), symbol
-        assert twice[symbol].average == pytest.approx(2.0 * quantity.average), symbol
 
 
 def assert_same(found: Quantity, expected: Quantity, relative: float = 1e-9) -> None:
@@ -159,75 +148,7 @@ def test_u_scales_with_sigma(factor: float, calibration: str) -> None:
         assert by_estimate[symbol].maximum == pytest.approx(factor * quantity.maximum, rel=1e-12)
 
 
-@given(seeds, st.sampled_from(["sides", "neighbours", "coordinates"]))
-@settings(max_examples=20, deadline=None)
-def test_an_added_reading_never_raises_a_variance(seed: int, calibration: str) -> None:
-    generator = np.random.default_rng(seed)
-    design = small_design(seed, calibration)
-    before, spread_before, layout = judged(design)
-    readings = design.readings
-    extra = replace(
-        readings,
-        ball=np.append(readings.ball, generator.integers(len(design.balls.places))),
-        position=np.append(readings.position, generator.integers(len(design.positions.rotations))),
-        probe=np.append(readings.probe, generator.integers(len(design.probes.offsets))),
-        repeats=np.append(readings.repeats, generator.integers(1, 4)),
-    )
-    after, spread_after, _ = judged(replace(design, readings=extra))
-    slack = 1 + 1e-9
-    assert np.all(spread_after.of_balls() <= spread_before.of_balls() * slack)
-    everything = np.eye(len(layout))
-    assert np.all(spread_after.of_shared(everything) <= spread_before.of_shared(everything) * slack)
-    for symbol in ("U4", "U5", "U6"):
-        assert after[symbol].maximum <= before[symbol].maximum * slack
-        assert after[symbol].average <= before[symbol].average * slack
-
-
-@pytest.mark.parametrize("calibration", ["sides", "coordinates"])
-def test_linearised_uncertainty_is_the_spread_of_repeated_estimates(calibration: str) -> None:
-    """Sixty complete non-linear estimates of a machine with errors; chi-squared of all parameters
-    together.
-    """
-    design = small_design(2, calibration)
-    generator = np.random.default_rng(11)
-    drawn = nominal_state(design)
-    truth = State(
-        drawn.balls,
-        drawn.rotations,
-        drawn.origins,
-        1e-5 * generator.standard_normal(len(design.model.parameters)),
-        drawn.probes,
-        drawn.lengths,
-    )
-    _, spread, layout = judged(design)
-    trials = 60
-    balls, model, ratio = [], [], []
-    for _ in range(trials):
-        certified = noisy_certificate(design, truth, generator)
-        readings, x = noisy_readings(certified, truth, generator)
-        observed = replace(certified, readings=readings)
-        solution = gauss_newton(observed, x, initial_state(observed, x))
-        assert solution.status == "converged"
-        balls.append(solution.state.balls - truth.balls)
-        model.append(solution.state.a - truth.a)
-        freedom = observed.observation_count - observed.parameter_count
-        ratio.append(solution.factor.sum_of_squares / freedom)
-    # Mean square over all trials, relative to the variance; its spread for normal variables is
-    # sqrt(2 / trials).
-    of_model = spread.of_shared(np.eye(len(layout))[layout.model])
-    for found, stated in ((np.array(model), of_model), (np.array(balls), spread.of_balls())):
-        squared = (found**2).mean(axis=0) / stated**2
-        assert np.all(np.abs(squared - 1) < 5 * np.sqrt(2 / trials))
-        # Parameters are correlated, so that their mean cannot be expected to be closer than a
-        # single one's error.
-        assert abs(squared.mean() - 1) < 3 * np.sqrt(2 / trials)
-        bias = found.mean(axis=0) / stated * np.sqrt(trials)
-        assert np.abs(bias).max() < 5
-    freedom = design.observation_count - design.parameter_count
-    assert abs(np.mean(ratio) - 1) < 4 * np.sqrt(2 / (freedom * trials))
-
-
-@pytest.mark.parametrize("size", [1, 3, 5])
+@pytest.mark.parametrize("size", [1, 5])
 def test_tiles_do_not_matter(monkeypatch: pytest.MonkeyPatch, size: int) -> None:
     expected, _, _ = judged(small_design(4))
     monkeypatch.setattr("ballplate.uncertainty.pairs.TILE", size)
@@ -237,7 +158,7 @@ def test_tiles_do_not_matter(monkeypatch: pytest.MonkeyPatch, size: int) -> None
         assert found[symbol].largest == expected[symbol].largest
 
 
-@pytest.mark.parametrize("rows", [10, 64, 100_000])
+@pytest.mark.parametrize("rows", [10, 64])
 def test_batches_do_not_matter(monkeypatch: pytest.MonkeyPatch, rows: int) -> None:
     expected, _, _ = judged(small_design(4, "neighbours"))
     monkeypatch.setattr("ballplate.simulator.estimation.elimination.ROWS_AT_ONCE", rows)

@@ -25,7 +25,7 @@ title: repeatability
 base: base.yaml
 axes:
   u: {path: machine.repeatability, values: [0.4 um, 0.8 um]}
-trials: 128
+trials: 32
 """
 
 # Everything that a person sees, with and without the entry.

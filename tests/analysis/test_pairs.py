@@ -62,12 +62,12 @@ def one_by_one(moved: Displacements) -> tuple[NDArray[np.int64], Real, Real]:
     return every, lengths, np.sqrt((np.concatenate(parts, axis=1) ** 2).sum(axis=1))
 
 
-# In one tile, in six, in a plane of space, and in the plane.
+# In one tile, in three, in a plane of space, and in the plane.
 MANY = {
     "one tile": scattered(40),
-    "tiles": scattered(600),
-    "flat": scattered(300, 3, flat=True),
-    "plane": scattered(300, 4, d=2),
+    "tiles": scattered(300),
+    "flat": scattered(60, 3, flat=True),
+    "plane": scattered(60, 4, d=2),
 }
 
 

@@ -13,18 +13,15 @@ from ballplate.results.checked_designs import predict
 from ballplate.simulator.design.arrays import Design, State, nominal_state
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.design.parameters import SharedLayout, shared_layout
-from ballplate.simulator.estimation.functions import displacements, linear_functions
+from ballplate.simulator.estimation.functions import linear_functions
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.quantities import Target
 from ballplate.uncertainty.kernel_quantities import task_distances
-from ballplate.uncertainty.pairs import pairs_of
 from ballplate.uncertainty.summaries import uncertainties
-from ballplate.uncertainty.tasks import task_uncertainties
 
-from tests.analysis import wording
 from tests.analysis.test_invariants import judged, small_design
 from tests.reference.designs import altered
 
@@ -156,14 +153,3 @@ def test_share_within_counts_only_tasks_with_a_target(tmp_path: Path) -> None:
     assert share(targets[0], None, None) == 0.0
     assert share(None, None, None) is None
     assert share(targets[0], targets[1], None) == 0.5
-
-
-def test_named_distances_need_no_targets_and_are_in_proportion_to_sigma(tmp_path: Path) -> None:
-    at = linearise(lay_out(with_tasks(tmp_path)))
-    given = replace(task_distances(at.design), targets=())
-    tile = pairs_of(displacements(at, given.places), given.pairs)
-    one, three = (task_uncertainties(given, tile, sigma) for sigma in (1.0, 3.0))
-    assert [task.name for task in one] == ["bore distance", wording.FROM_SIDE_TO_SIDE, "height"]
-    for first, second in zip(one, three, strict=True):
-        assert first.target is None and first.is_within is None
-        assert second.standard_uncertainty == pytest.approx(3.0 * first.standard_uncertainty)

@@ -1,14 +1,12 @@
-"""Words for how artefacts deform and for bars that are proposed, against what they mean."""
+"""Words for how artefacts deform, against what they mean."""
 
 from __future__ import annotations
 
-import re
 from itertools import product
 
 import ballplate as bp
 import numpy as np
 import pytest
-from ballplate.extensions.repair.placing import bars
 from ballplate.rank.verdicts import deformation, shape
 
 from tests.analysis import wording
@@ -136,35 +134,6 @@ def test_the_shape_of_a_curve_is_the_degree_that_describes_it(degree: int) -> No
     words += [f"of degree {k}" for k in range(4, 11)] + ["irregular"] * 2
     assert shape(t, curve) == shape(t, curve + 0.99e-3 * beside) == words[degree]
     assert shape(t, curve + 1.01e-3 * beside) == words[degree + 1]
-
-
-@pytest.mark.parametrize("d", [2, 3])
-def test_bars_lie_along_all_neighbours_in_a_cube(d: int) -> None:
-    """Axes and diagonals, each once whatever its sign, and the words say which."""
-    every = list(bars(d))
-    found = set()
-    for words, u in every:
-        assert np.linalg.norm(u) == pytest.approx(1.0)
-        whole = np.round(u / np.abs(u).max())
-        np.testing.assert_allclose(whole / np.linalg.norm(whole), u, atol=1e-12)
-        found.add(max(tuple(whole), tuple(-whole)))
-        np.testing.assert_allclose(np.abs(in_words(words, d) @ u), 1.0, atol=1e-12)
-    wanted = {max(one, tuple(-k for k in one)) for one in product((-1, 0, 1), repeat=d)}
-    assert found == {one for one in wanted if any(one)}
-    assert len(every) == len(found)
-
-
-def in_words(words: str, d: int) -> np.ndarray:
-    """The direction (d,) that words give, of length one."""
-    axes = np.eye(d)
-    if words.removeprefix("along ") in tuple("xyz"):
-        return axes["xyz".index(words[-1])]
-    if plane := re.fullmatch(r"in the (.)(.) plane at (-?\d+) deg", words):
-        angle = np.radians(float(plane[3]))
-        first, second = (axes["xyz".index(one)] for one in plane.groups()[:2])
-        return np.cos(angle) * first + np.sin(angle) * second
-    diagonal = np.array([float(one) for one in re.findall(r"-?\d+", words)])
-    return diagonal / np.linalg.norm(diagonal)
 
 
 @pytest.mark.parametrize(

@@ -17,6 +17,8 @@ from ballplate.simulator.experiment.loading import with_pool
 from ballplate.uncertainty.kernel_quantities import QuantityKind, evaluation_points
 from ballplate.uncertainty.quantities import QUANTITIES
 
+from tests.reference.small_quickstart import OF_ENTRIES
+
 PAIR = np.array([[0, 1]])
 POOL = {
     "candidates": [
@@ -86,7 +88,7 @@ def test_targets_and_balls_are_of_lengths(field: str) -> None:
 
 
 def target(criterion: str, **sections: Any) -> float | None:
-    experiment = with_pool(bp.quickstart().with_(pool=POOL, **sections))
+    experiment = with_pool(bp.quickstart().with_(OF_ENTRIES).with_(pool=POOL, **sections))
     return campaign(experiment, Request(criterion)).target
 
 

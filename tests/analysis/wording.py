@@ -4,7 +4,6 @@ BENDS_OUT_OF_ITS_PLANE = "bends out of its plane"
 CHANGE_TOGETHER_WITHOUT_CHANGING_ANY_OBSERVATION = (
     ": change together without changing any observation"
 )
-FROM_SIDE_TO_SIDE = "from side to side"
 GOAL_NOT_MET = "goal not met: average U6"
 LENGTHS_OF_THE_BODY_DIAGONALS = "lengths of the body diagonals"
 PROBE_OFFSETS_WITH_A_STANDARD = "probe offsets with a standard uncertainty"

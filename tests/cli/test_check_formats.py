@@ -16,7 +16,8 @@ import yaml
 from ballplate.cli import main
 from ballplate.extensions.ci.github import annotation_lines, in_message, in_property
 from ballplate.extensions.ci.junit import junit_report
-from ballplate.extensions.repair.repair_search import Repairs, repairs
+from ballplate.extensions.repair.repair_search import repairs
+from ballplate.extensions.repair.repairs import Repairs
 from ballplate.planning.checked_files import CheckedFile, check_files
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import Message
@@ -230,52 +231,45 @@ def test_a_junit_report_is_well_formed_for_any_text() -> None:
 def found_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """Repairs of designs of the same name are looked for once."""
 
-    def repairs_of(experiment: Experiment, **others: Any) -> Repairs | None:
+    def repairs_of(experiment: Experiment, report: Any) -> Repairs:
         if experiment.label not in known:
-            known[experiment.label] = repairs(experiment, **others)
+            known[experiment.label] = repairs(experiment, report)
         return known[experiment.label]
 
-    known: dict[str, Repairs | None] = {}
-    monkeypatch.setattr("ballplate.extensions.repair.suggestions.repairs", repairs_of)
+    known: dict[str, Repairs] = {}
+    monkeypatch.setattr("ballplate.extensions.repair.repair_search.repairs", repairs_of)
 
 
 def test_suggestions_in_every_format(
     folder: Path, found_once: None, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    chosen = ["--variant", "A", "--variant", "B", "wrong.yaml"]
+    chosen = ["--variant", "B", "--variant", "C", "wrong.yaml"]
     assert run("check", *chosen) == 1
     plain = capsys.readouterr().out
     assert run("check", "--suggest", *chosen) == 1
     lines = capsys.readouterr().out.splitlines()
     repairs_told = [line for line in lines if line.startswith("repair ")]
-    of_scale = [
-        line for line in lines if line.startswith(("scale: calibrate", "scale, in the file"))
-    ]
-    assert len(of_scale) == 2 and lines.index(of_scale[0]) < lines.index(repairs_told[0])
     # What is told without suggestions stays as it is, and nothing is suggested where nothing is
     # open.
-    assert [line for line in lines if line not in [*repairs_told, *of_scale]] == plain.splitlines()
+    assert [line for line in lines if line not in repairs_told] == plain.splitlines()
     assert repairs_told[0].startswith("repair 1: turn position ") and "full rank" in repairs_told[0]
-    assert sum("in the file: " not in line for line in repairs_told) == 3
+    assert sum("in the file: " not in line for line in repairs_told) == 2
 
     assert run("check", "--json", *chosen) == 1
     before = json.loads(capsys.readouterr().out)
     assert run("check", "--json", "--suggest", *chosen) == 1
-    good, bad = json.loads(capsys.readouterr().out)
+    bad, good = json.loads(capsys.readouterr().out)
     assert good.pop("repairs") is None
-    assert good.pop("scale_certificate")["text"] == of_scale[0].split(": ")[1]
     suggested = bad.pop("repairs")
-    assert bad.pop("scale_certificate") is None
-    assert [good, bad] == before
-    assert [one["rank_deficiency"] for one in suggested["complete"]] == [0, 0, 0]
-    assert suggested["complete"][0]["removes"] == [1, 2]
-    assert suggested["complete"][0]["edits"][0]["path"].startswith("positions[")
-    assert 1e-7 < suggested["complete"][0]["average_U6"] < 1e-6
+    assert [bad, good] == before
+    assert [one["rank_deficiency"] for one in suggested] == [0, 0]
+    assert [one["changes"][0]["kind"] for one in suggested] == ["move", "read"]
+    assert suggested[0]["edits"][0]["path"].startswith("positions[")
+    assert 1e-7 < suggested[0]["average_U6"] < 1e-6
 
     assert run("check", "--format", "github", "--suggest", *chosen) == 1
-    as_expected, *certificate, error = capsys.readouterr().out.splitlines()
-    assert wording.THE_SCALE_RESTS_ON_PROBE_OFFSETS in as_expected and "repair" not in as_expected
-    assert [line.split(": ", 3)[3] for line in certificate] == of_scale
+    error, *as_expected = capsys.readouterr().out.splitlines()
+    assert as_expected and "repair" not in "".join(as_expected)
     assert "%0Arepair 1: turn position " in error
     assert run("check", "--format", "junit", "--suggest", *chosen) == 1
     failure = ElementTree.fromstring(capsys.readouterr().out).find(".//failure")
@@ -373,6 +367,10 @@ def test_the_action_checks(tmp_path: Path) -> None:
     assert len(lines) > 1 and all(
         line.startswith("::error file=designs/one.yaml,line=1,") for line in lines[:-1]
     )
+    # Another word than true and false is refused, not taken for false.
+    for name in ("FAIL_WEAK", "MODULES"):
+        found = shell(check["run"], tmp_path, FILES="designs/more/of them.yaml", **{name: "yes"})
+        assert found.returncode == 2 and "is true or false, not yes" in found.stdout
     # A pattern that nothing matches is no success, and what an input contains is never run.
     found = shell(check["run"], tmp_path, FILES="nothing/*.yaml\n$(touch intruder)")
     assert found.returncode == 3 and "nothing/*.yaml" in found.stdout

@@ -68,13 +68,14 @@ def test_other_numbers_of_turns_are_refused_with_the_one_that_turns_as_far(
     tmp_path: Path, turns: int, same: int
 ) -> None:
     path, text = tmp_path / "e.yaml", Path("designs/planning/plate-pool.yaml").read_text()
-    assert "quarter_turns: [0, 1, 2, 3]" in text
-    path.write_text(text.replace("quarter_turns: [0, 1, 2, 3]", f"quarter_turns: [0, {turns}]"))
+    assert "quarter_turns: &turns [0, 1, 2, 3]" in text
+    path.write_text(text.replace("[0, 1, 2, 3]", f"[0, {turns}]", 1))
     with pytest.raises(ExperimentError) as caught:
         load(path, planning=True)
-    (message,) = caught.value.messages
-    assert message.path == "pool.candidates[0].quarter_turns[1]"
-    assert message.text.endswith(f"write 0 to 3, such as {same}, which turns as far")
+    # The other groups have the same turns, by an alias.
+    for k, message in enumerate(caught.value.messages):
+        assert message.path == f"pool.candidates[{k}].quarter_turns[1]"
+        assert message.text.endswith(f"write 0 to 3, such as {same}, which turns as far")
 
 
 MACHINE = """\

@@ -17,7 +17,7 @@ from typing import Any
 
 import pytest
 from ballplate.cli import main
-from ballplate.cli.interruption import interruptions
+from ballplate.cli.interruption import Interruption
 from ballplate.extensions.sweeps import execute
 from ballplate.simulator.computing import processes
 from ballplate.simulator.computing.processes import in_processes
@@ -79,22 +79,6 @@ def test_one_that_was_swallowed_ends_monte_carlo(
     assert wording.THE_RESULTS_ARE_THOSE in capsys.readouterr().err
 
 
-def test_they_are_remembered() -> None:
-    with interruptions() as interruption:
-        interruption.answer()
-        swallowed()
-        with pytest.raises(KeyboardInterrupt):
-            interruption.answer()
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
-
-
-def test_ignored_ones_stay_ignored() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    with interruptions() as interruption:
-        signal.raise_signal(signal.SIGINT)
-        interruption.answer()
-
-
 @pytest.mark.parametrize(
     "module", ["ballplate.cli.common", "ballplate.simulator.inputs.messages", "numpy", "joblib"]
 )
@@ -143,9 +127,14 @@ def test_processes_are_started_undisturbed(monkeypatch: pytest.MonkeyPatch, numb
 
     begun: list[int] = []
     monkeypatch.setattr(joblib, "Parallel", Interrupted)
-    with interruptions() as interruption, pytest.raises(KeyboardInterrupt), interruption.raising():
-        list(in_processes(abs, [(-1,), (2,)], 2))
-    assert begun == [number] and interruption.came == number
+    interruption = Interruption()
+    before = signal.signal(number, interruption.handle)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            list(in_processes(abs, [(-1,), (2,)], 2))
+    finally:
+        signal.signal(number, before)
+    assert begun == [number] and interruption.came == signal.Signals(number).name
     assert not [one for one in multiprocessing.active_children() if "Loky" in one.name]
 
 

@@ -7,16 +7,12 @@ import os
 import signal
 import subprocess
 import sys
-from argparse import Namespace
 from collections.abc import Callable
-from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.cli import _module_of, commands_of_all, main
-from ballplate.cli.memory import SMALLER, no_memory
-from ballplate.cli.run import run
+from ballplate.cli import _module_of, main
 from ballplate.simulator.computing.processes import in_processes
 
 QUICKSTART = "designs/quickstart.yaml"
@@ -34,59 +30,38 @@ def _fork() -> None:
     raise OSError(errno.ENOMEM, "Cannot allocate memory")
 
 
-@pytest.mark.parametrize(
-    "command", ["check", "run", "plan", "reach", "run --lengths", "run --reliability", "compare"]
-)
-@pytest.mark.parametrize(
-    ("failure", "told"),
-    [(_array, ": there is no room for another 2.00 EiB; "), (_plain, "; "), (_fork, "; ")],
-)
-def test_no_memory_in_any_command(
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-    command: str,
-    failure: Callable[..., None],
-    told: str,
-) -> None:
-    module = _module_of(command)
-
-    def fails(options: Namespace) -> int:
-        failure()
-        return 0
-
-    monkeypatch.setattr(module, "run", fails)
-    arguments = ["--target", "1 um"] if command == "reach" else []
-    assert main([command, QUICKSTART, *arguments]) == 3
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert (
-        err
-        == f"{QUICKSTART}: {command} needs more memory than is available{told}{SMALLER[command]}\n"
-    )
-
-
 def _killed() -> None:
+    """As if the system had ended a worker for want of memory."""
+    list(in_processes(_end, [(), ()], 2))
+
+
+def _end() -> None:
     os.kill(os.getpid(), signal.SIGKILL)
 
 
-@pytest.mark.parametrize(
-    ("work", "told"),
-    [(_killed, "a worker process of run was ended"), (_array, "run needs more memory")],
-)
-def test_no_memory_in_a_worker(work: Callable[[], None], told: str) -> None:
-    """The first as if the system had ended it for want of memory."""
-    with pytest.raises((BrokenProcessPool, MemoryError)) as caught:
-        list(in_processes(work, [(), ()], 2))
-    options = Namespace(command="run", run=run, files=[Path(QUICKSTART)])
-    message = no_memory(caught.value, options)
-    assert message is not None and message.startswith(f"{QUICKSTART}: {told}")
+WANT = "ballplate run needs more memory than is available"
+REMEDY = "; make the design smaller, or use fewer --workers\n"
 
 
 @pytest.mark.parametrize(
-    "error", [ValueError("1 GiB"), OSError(errno.ENOSPC, "No space left on device")]
+    ("failure", "told"),
+    [
+        (_array, f"{WANT}: there is no room for another 2.00 EiB{REMEDY}"),
+        (_plain, f"{WANT}{REMEDY}"),
+        (_fork, f"{WANT}{REMEDY}"),
+        (_killed, "ballplate run: a worker process was ended from outside, as a rule because"),
+    ],
 )
-def test_other_errors_are_none_of_memory(error: Exception) -> None:
-    assert no_memory(error, Namespace(command="run", run=run, files=[])) is None
+def test_no_memory(
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    failure: Callable[..., None],
+    told: str,
+) -> None:
+    monkeypatch.setattr(_module_of("run"), "run", lambda _: failure())
+    assert main(["run", QUICKSTART]) == 3
+    out, err = capsys.readouterr()
+    assert out == "" and err.startswith(told) and err.count("\n") == 1
 
 
 def test_a_process_with_little_memory(tmp_path: Path) -> None:
@@ -115,8 +90,4 @@ def test_a_process_with_little_memory(tmp_path: Path) -> None:
     assert found.returncode == 3, found.stderr
     assert found.stdout == ""
     (line,) = found.stderr.splitlines()
-    assert line.startswith(f"{tmp_path}/large.yaml: run needs more memory than is available")
-
-
-def test_remedies_are_of_commands() -> None:
-    assert set(SMALLER) <= set(commands_of_all())
+    assert line.startswith(WANT)

@@ -105,25 +105,17 @@ def test_files_in_each_others_place_are_told(
     for arguments, words in (
         (["next", "readings.csv", design], f"first, then the readings: next {design} readings.csv"),
         (["run", "--budget", "readings.csv", design], "the experiment file comes first"),
-        (["fit", design, "map.npz"], "map.npz is no table of readings"),
+        (["fit", design, "map.yml"], "map.yml is no table of readings"),
         (["next", design, "map.yaml"], "map.yaml is no table of readings"),
-        (
-            ["adjust", "map.yaml", "--scale", "x=1 ppm", "--after", "r.csv"],
-            "r.csv:1:1: is no map file",
-        ),
+        (["diff", "map.yaml", "r.csv"], "r.csv:1:1: is no map file"),
     ):
-        if "--after" in arguments:
+        if "diff" in arguments:
             readings = bp.simulate(bp.quickstart())
             readings.to_csv(tmp_path / "r.csv", index=False)
             fit = bp.fit(bp.quickstart(), readings)
             bp.write_map(fit.to_map(), tmp_path / "map.yaml")  # type: ignore[attr-defined]
             files = ("map.yaml", "r.csv")
             arguments = [str(tmp_path / one) if one in files else one for one in arguments]
-        # A file for an option is refused as a file, with its line.
-        assert main(arguments) == (3 if "--after" in arguments else 2), arguments
+        # A table in the place of a map is refused as a file, with its line.
+        assert main(arguments) == (3 if "diff" in arguments else 2), arguments
         assert words in capsys.readouterr().err
-
-
-def test_the_grammar_of_one_command_is_that_among_all() -> None:
-    for name, command in commands().items():
-        assert parser([name]).commands[name].format_help() == command.format_help()

@@ -36,10 +36,14 @@ def found_by(
     ("arguments", "unbuffered"), [("--version", "1"), ("check --help", ""), ("schema", "")]
 )
 def test_help_and_version_are_data_too(arguments: str, unbuffered: str, tmp_path: Path) -> None:
-    for to, reason in ((">&-", "Bad file descriptor"), (">/dev/full", "No space left on device")):
-        found = found_by(["bash", "-c", f"{COMMAND} {arguments} {to}"], tmp_path, unbuffered)
-        assert found.stderr == f"standard output: cannot be written ({reason}); give it room\n"
-        assert found.returncode == 3
+    reason = "No space left on device"
+    found = found_by(["bash", "-c", f"{COMMAND} {arguments} >/dev/full"], tmp_path, unbuffered)
+    assert found.stderr == f"standard output: cannot be written ({reason}); give it room\n"
+    assert found.returncode == 3
+    for to in (">&-", "| true"):
+        line = f"set -o pipefail; {COMMAND} {arguments} {to}"
+        found = found_by(["bash", "-c", line], tmp_path, unbuffered)
+        assert (found.returncode, found.stderr) == (0, "")
 
 
 def test_a_store_is_not_blamed_for_standard_output(tmp_path: Path) -> None:

@@ -50,15 +50,12 @@ DIRECTIONS_ARE_TOO_MANY = (
     "12:57: artefacts.many.directions: 5040 directions are too many; at most 5000 are possible"
 )
 DISTANCES_AGAINST_THE_TRUE_MACHINES = "distances against the true machine's"
-DISTANCES_BETWEEN_CORRECTED_POINTS = "U6  distances between corrected points"
 ESTIMATORS_OF_DISTANCES_ALONE_CANNOT_FOLLOW = (
     "artefacts: estimators of distances alone cannot follow a Bryan gauge's pivot; use --estimator"
 )
 ESTIMATOR_DISTANCES_LENGTHS_OF_STANDARDS_AGAINST = (
     "estimator distances (12 lengths of standards) against"
 )
-EVERY_BAR_LIES_PARALLEL = "every bar lies parallel to the xy plane"
-EVERY_BAR_LIES_PARALLEL_TO_THE_XY = "reason: every bar lies parallel to the xy plane"
 EXX_POSITIONING_ERROR = "EXX (positioning error of X, quadratic)"
 FAR_OUTSIDE_THE_VOLUME = "far outside the volume; check the unit"
 FINISHED_CELLS_ARE_IN_NEW_SQLITE = "finished cases are in new.sqlite"
@@ -94,11 +91,6 @@ MONOMIALS_APPLIES_TO_ESTIMATOR_FULL = (
     "--monomials applies to --estimator full, distances, cresto or kruth only; leave it out"
 )
 MONTE_CARLO_DATA_SETS = "Monte Carlo: 10 data sets of the true machine"
-MONTE_CARLO_DATA_SETS_OF_THE_TRUE = "Monte Carlo: 100 data sets of the true machine, seed 1"
-NO_FILE_WAS_WRITTEN = "no file was written"
-NO_LENGTH_IS_KNOWN = (
-    "reason: no length is known (gauge: radius): the overall scale of the machine is undetermined"
-)
 NO_READING_OF_THE_BALLS = 'no reading of the balls "r1c2", "r1c3"'
 OF_THE_STATED_ONES = "of the stated ones"
 ONLY_A_BRYAN_GAUGE_HAS = (
@@ -130,7 +122,6 @@ STANDARD_OUTPUT_CANNOT_BE_WRITTEN = "standard output: cannot be written"
 STANDARD_OUTPUT_CANNOT_BE_WRITTEN_NO_SPACE = (
     "standard output: cannot be written (No space left on device); give it room"
 )
-STARTS_OF_THE_SEARCH = "0/25 starts of the search"
 SWAP_THE_NAMES_OF_THE_BALLS = "swap the names of the balls in lines 60 and 71"
 SWAP_THE_NAMES_OF_THE_BALLS_IN_LINES = "swap the names of the balls in lines 5 and 9"
 THE_DESIGN_LEAVES_ERRORS_UNDETERMINED = "the design leaves errors undetermined"

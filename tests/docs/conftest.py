@@ -13,9 +13,7 @@ import pytest
 
 @pytest.fixture(scope="session")
 def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The pages, built with the network out of reach; the data sets of the page of NPL's results,
-    which `ballplate reproduce` draws as well, are few.
-    """
+    """The pages, built with the network out of reach."""
     folder = tmp_path_factory.getbasetemp()
     # Processes of one session have folders next to one another.
     if "PYTEST_XDIST_WORKER" in os.environ:
@@ -41,7 +39,7 @@ def build(source: Path, pages: Path) -> str:
     """Build pages as CONTRIBUTING says, and return what is wrong with them, empty where nothing."""
     nowhere = dict.fromkeys(("http_proxy", "https_proxy", "all_proxy"), "http://127.0.0.1:9")
     found = subprocess.run(
-        [sys.executable, "-m", "sphinx", "-W", "-n", "-q", "-D", "data_sets=4", source, pages],
+        [sys.executable, "-m", "sphinx", "-W", "-n", "-q", source, pages],
         env={**os.environ, **nowhere},
         capture_output=True,
         text=True,

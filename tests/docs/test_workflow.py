@@ -15,6 +15,7 @@ import pytest
 import yaml
 
 WORKFLOW = Path(".github/workflows/tests.yml")
+WORKFLOWS = sorted(WORKFLOW.parent.glob("*.yml"))
 README = Path("README.md").read_text(encoding="utf-8")
 STEPS = [
     step
@@ -33,8 +34,11 @@ def command(name: str) -> str:
 @pytest.mark.parametrize(
     ("schema", "file"),
     [
-        ("vendor.github-workflows", WORKFLOW),
-        ("custom.github-workflows-require-timeout", WORKFLOW),
+        *[
+            (schema, path)
+            for path in WORKFLOWS
+            for schema in ("vendor.github-workflows", "custom.github-workflows-require-timeout")
+        ],
         ("vendor.github-actions", Path("action.yml")),
     ],
 )
@@ -47,25 +51,43 @@ def test_a_linter_finds_nothing(schema: str, file: Path, tmp_path: Path) -> None
     wrong = tmp_path / "wrong.yml"
     text = file.read_text(encoding="utf-8")
     wrong.write_text(
-        text.replace("timeout-minutes: 60", "").replace("using:", "usign:"), encoding="utf-8"
+        re.sub(r"timeout-minutes: \d+", "", text).replace("using:", "usign:"), encoding="utf-8"
     )
     if schema == "vendor.github-workflows":
         wrong.write_text(text.replace("runs-on:", "run-on:"), encoding="utf-8")
     assert linted(wrong) == 1
 
 
-def test_it_may_do_little_and_uses_what_cannot_change() -> None:
-    workflow: Any = yaml.safe_load(WORKFLOW.read_text(encoding="utf-8"))
+@pytest.mark.parametrize("path", WORKFLOWS, ids=lambda path: path.stem)
+def test_it_may_do_little_and_uses_what_cannot_change(path: Path) -> None:
+    workflow: Any = yaml.safe_load(path.read_text(encoding="utf-8"))
     assert workflow["permissions"] == {
         "contents": "read"
-    } and "pull_request_target" not in WORKFLOW.read_text("utf-8")
-    used = [step["uses"] for step in STEPS if "uses" in step]
-    assert len(used) == 6 and all(
-        re.fullmatch(r"actions/[a-z-]+@[0-9a-f]{40}", one) for one in used
-    )
-    assert not any("permissions" in job for job in workflow["jobs"].values())
+    } and "pull_request_target" not in path.read_text("utf-8")
+    steps = [step for job in workflow["jobs"].values() for step in job["steps"]]
+    used = [step["uses"] for step in steps if "uses" in step]
+    assert used and all(re.fullmatch(r"actions/[a-z-]+@[0-9a-f]{40}", one) for one in used)
+    # Only what a tag starts writes anything.
+    writing = [name for name, job in workflow["jobs"].items() if "permissions" in job]
+    assert all(workflow["jobs"][name]["if"] == "github.ref_type == 'tag'" for name in writing)
+    assert writing == (["publish"] if path.stem == "release" else [])
     # Nothing that somebody else chooses, such as the name of a branch, gets into a script.
-    assert not any("${{" in step.get("run", "") for step in STEPS)
+    assert not any("${{" in step.get("run", "") for step in steps)
+
+
+def test_the_release_has_one_version() -> None:
+    version = tomllib.loads(Path("pyproject.toml").read_text(encoding="utf-8"))["project"][
+        "version"
+    ]
+    cited = yaml.safe_load(Path("CITATION.cff").read_text(encoding="utf-8"))
+    assert cited["version"] == version
+    changes = Path("CHANGELOG.md").read_text(encoding="utf-8")
+    assert f"## {version} ({cited['date-released']})" in changes
+    assert len(changes.splitlines()) < 70
+    # Fragments are named so that they are collected.
+    kinds = "added|changed|removed|fixed"
+    for path in Path("changes").iterdir():
+        assert path.name == "README.md" or re.fullmatch(rf"[\w-]+\.({kinds})\.md", path.name)
 
 
 def test_every_system_and_version_is_tried() -> None:
@@ -96,8 +118,8 @@ def test_every_dependency_states_the_oldest_version_tried() -> None:
     assert all(
         re.fullmatch(r"[A-Za-z0-9-]+>=[0-9.]+|ballplate\[[a-z,]+\]", one) for one in stated
     ), stated
-    # What the tests take along is what the command above installs: all but what only benchmarks
-    # and tests in a browser need.
+    # What the tests take along is what the command above installs: all but what only benchmarks,
+    # tests in a browser and releases need.
     tried = {
         "test",
         *re.findall(
@@ -110,7 +132,7 @@ def test_every_dependency_states_the_oldest_version_tried() -> None:
         if one.startswith("ballplate[")
         for name in re.findall(r"\w+", one[9:])
     }
-    assert set(extras) - tried == {"benchmark", "browser"}
+    assert set(extras) - tried == {"benchmark", "browser", "release"}
     assert "3.11" in project["requires-python"] and command("oldest versions").startswith(
         "python3.11 "
     )

@@ -298,23 +298,6 @@ def test_each_repeat_of_a_gauge_is_a_length_of_its_own(tmp_path: Path) -> None:
     )
 
 
-def test_a_bar_whose_ends_are_plate_balls_turns_about_itself_for_nobody(tmp_path: Path) -> None:
-    """As a plate, too, the two balls say nothing of the turn about their line, and it is no
-    parameter.
-    """
-    as_plate = changed(
-        tmp_path, "bar-bell", artefacts={"bar": {"kind": "two_spheres", "length": "500 mm"}}, calibration=[
-            {"kind": "distances", "pairs": "all", "standard_uncertainty": "0.5 um"}
-        ]
-    )  # fmt: skip
-    found, alone = predict(as_plate), predict(shipped("bar-bell", "length known"))
-    assert found.verdict.deficiency == 0
-    for symbol in ("U3 ratios", "U3 angles"):
-        assert found.quantities[symbol].maximum == pytest.approx(
-            alone.quantities[symbol].maximum, rel=1e-6
-        )
-
-
 def test_a_sphere_through_points(tmp_path: Path) -> None:
     generator = np.random.default_rng(3)
     directions = generator.standard_normal((20, 3))
@@ -329,19 +312,6 @@ def test_a_sphere_through_points(tmp_path: Path) -> None:
     np.testing.assert_allclose(
         fit_sphere(flat, np.array([0.0, 0.0, 2.9]))[0], [1.0, 2.0, 2.9], atol=1e-14
     )
-
-
-def test_two_steps_find_the_unknown_length_of_a_bar_in_the_second(tmp_path: Path) -> None:
-    design = lay_out(changed(tmp_path, "bryan-gauge", **BOTH))
-    on_truth, truth = truth_of(changed(tmp_path, "bryan-gauge", **BOTH), design)
-    _, x = exact_readings(on_truth, truth)
-    found = length_estimate(design, x, "sphere-then-metric")
-    metric = metric_of(found.factors)
-    seen = x + design.probes.offsets[design.readings.probe]
-    bar = seen[design.of(Lengths).first[0]] - seen[design.of(Lengths).second[0]]
-    # Nothing else depends on it, so that its own equation holds.
-    assert found.lengths[0] ** 2 == pytest.approx(bar @ metric @ bar, rel=1e-14)
-    assert abs(found.lengths[0] - np.linalg.norm(bar)) > 1e-6
 
 
 def metric_of(factors: np.ndarray) -> np.ndarray:

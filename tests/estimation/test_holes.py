@@ -123,18 +123,6 @@ def test_estimates_do_not_depend_on_what_stands_in_the_place_of_the_third(tmp_pa
     np.testing.assert_allclose(in_memory.state.balls[:, 2], 0.0, rtol=0, atol=1e-12)
 
 
-def test_sums_of_squares_are_those_of_chi_squared() -> None:
-    experiment = small()
-    design, squares = lay_out(experiment), []
-    for seed in range(15):
-        found = simulated_readings(experiment, seed=seed)
-        solution = gauss_newton(design, found.x, initial_state(design, found.x))
-        assert solution.status == "converged"
-        squares.append(solution.factor.sum_of_squares)
-    freedom = design.observation_count - design.parameter_count
-    assert abs(np.mean(squares) - freedom) < 4.0 * np.sqrt(2.0 * freedom / 15)
-
-
 def test_heavy_weights_are_eliminated_the_same() -> None:
     """Certificates that outweigh readings take the other way of elimination from ten thousand times
     on; such certificates are as good as exact either way.
@@ -217,7 +205,7 @@ def test_estimators_of_distances_alone_refuse(changes: dict[str, Any], expected:
         compare(small(**changes), trials=2)
 
 
-@pytest.mark.parametrize("single", [(k,) for k in range(6)] + [(1, 2, 5), (2, 3, 4)])
+@pytest.mark.parametrize("single", [(0,), (3,), (1, 2, 5)])
 @pytest.mark.parametrize("line", ["r{}c2", "r{}c3", "r2c{}"])
 def test_exact_readings_of_single_columns_and_rows_are_right(
     single: tuple[int, ...], line: str

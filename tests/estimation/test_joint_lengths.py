@@ -83,11 +83,8 @@ def twice_certified() -> list[dict[str, Any]]:
 
 CASES: dict[str, Make] = {
     "two balls": lambda folder: experiment(folder, bar(2), ALL),
-    "three balls, all pairs": lambda folder: experiment(folder, bar(3), ALL),
     "three balls, projected": lambda folder: experiment(folder, bar(3), PROJECTED),
     "six balls, all pairs": lambda folder: experiment(folder, bar(6), GROWING),
-    "six balls, consecutive pairs": lambda folder: experiment(folder, bar(6), consecutive(6)),
-    "plate, all pairs": lambda folder: experiment(folder, flat(3), ALL),
     "plate, all pairs projected": lambda folder: experiment(folder, flat(3), PROJECTED),
     "plate, neighbours": lambda folder: experiment(
         folder, flat(3), {**GROWING, "pairs": "neighbours"}
@@ -103,12 +100,6 @@ def test_every_uncertainty_is_that_of_the_full_covariance(name: str, tmp_path: P
     assert_as_dense(lay_out(CASES[name](tmp_path)))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("pairs", ["all", "neighbours"])
-def test_a_larger_plate_is_that_of_the_full_covariance(pairs: str, tmp_path: Path) -> None:
-    assert_as_dense(lay_out(experiment(tmp_path, flat(4), {**GROWING, "pairs": pairs})))
-
-
 def assert_as_dense(design: Design) -> None:
     assert compare(design, nominal_state(design), dense.planned(design, 3, 2)) == 0
     assert len(design.once(length_whitening)) == np.linalg.matrix_rank(
@@ -116,9 +107,7 @@ def assert_as_dense(design: Design) -> None:
     )
 
 
-@pytest.mark.parametrize(
-    "name", ["three balls, projected", "six balls, all pairs", "plate, all pairs"]
-)
+@pytest.mark.parametrize("name", ["three balls, projected", "six balls, all pairs"])
 def test_away_from_the_drawing_with_errors_and_noise(name: str, tmp_path: Path) -> None:
     """Uncertainties, S^2 and the Newton step, of standards whose lengths are as consistent as in
     reality.
@@ -199,13 +188,7 @@ CASES_AND_PLANE = CASES | {"plane": in_a_plane}
 
 @pytest.mark.parametrize(
     "name",
-    [
-        "three balls, all pairs",
-        "six balls, all pairs",
-        "plate, all pairs projected",
-        "two certificates",
-        "plane",
-    ],
+    ["two certificates", "plane"],
 )
 def test_what_is_whitened_twice_over_is_the_inverse(name: str, tmp_path: Path) -> None:
     """W'W is the pseudo-inverse of the covariance, W by itself and its transpose."""
@@ -238,36 +221,8 @@ FULL = {
 }
 
 
-@pytest.mark.parametrize(
-    ("standard", "known"),
-    [
-        (bar(2), ALL),
-        (bar(3), ALL),
-        (bar(6), GROWING),
-        (bar(6), consecutive(6)),
-        (flat(4), ALL),
-        (flat(3), PROJECTED),
-        (spatial(), GROWING),
-    ],
-    ids=["two", "three", "six", "consecutive", "plate", "projected", "space"],
-)
-def test_replicates_scatter_as_stated(
-    standard: dict[str, Any], known: dict[str, Any], tmp_path: Path
-) -> None:
-    """Readings are drawn, and lengths formed of them; so is one error of each certificate."""
-    assert_honest(experiment(tmp_path, standard, known, **TRUE), 2048)
-
-
 def test_replicates_of_a_model_that_is_not_linear(tmp_path: Path) -> None:
-    assert_honest(experiment(tmp_path, bar(3), ALL, **TRUE, **FULL), 128)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("standard", [bar(6), flat(4)], ids=["six", "plate"])
-def test_many_replicates_of_a_model_that_is_not_linear(
-    standard: dict[str, Any], tmp_path: Path
-) -> None:
-    assert_honest(experiment(tmp_path, standard, ALL, **TRUE, **FULL), 1024)
+    assert_honest(experiment(tmp_path, bar(3), ALL, **TRUE, **FULL), 64)
 
 
 def assert_honest(made: Experiment, count: int) -> None:
@@ -477,15 +432,3 @@ def test_true_standards_differ_from_their_certificates_as_stated(tmp_path: Path)
         )
     scatter = np.array(off).T @ np.array(off) / 400
     np.testing.assert_allclose(scatter, np.eye(3), atol=4 * np.sqrt(2 / 400))
-
-
-def test_lengths_without_shared_balls_are_whitened_one_by_one(tmp_path: Path) -> None:
-    design = lay_out(
-        experiment(
-            tmp_path,
-            bar(4),
-            {"pairs": [["b0", "b1"], ["b2", "b3"]], "standard_uncertainty": "1 um"},
-        )
-    )
-    assert isinstance(design.of(Lengths), Lengths) and not design.once(length_whitening).joint
-    assert len(design.once(length_whitening)) == len(design.of(Lengths))

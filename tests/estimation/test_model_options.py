@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from itertools import product
 from pathlib import Path
@@ -138,17 +137,6 @@ WITH_LINEAR = [
 
 # Settings, dimension, and the same as columns.
 OPTIONS: dict[str, tuple[dict[str, Any], int, list[Column]]] = {
-    "own functions": (
-        {"kind": "kinematic", **OWN},
-        3,
-        kinematic(families(NAMES, 4, 3, **OWN_FAMILIES), False, *CORNERS[3]),
-    ),
-    "squareness": (
-        {"kind": "kinematic", "squareness": "parameters", "position_coefficients": 4,
-         "rotation_coefficients": 3},
-        3,
-        kinematic(families(NAMES, 4, 3), True, *CORNERS[3]),
-    ),
     "squareness and own functions": (
         {"kind": "kinematic", "squareness": "parameters", **OWN},
         3,
@@ -171,21 +159,10 @@ OPTIONS: dict[str, tuple[dict[str, Any], int, list[Column]]] = {
             *CORNERS[3],
         ),
     ),
-    "smaller rotations": (
-        {"kind": "empirical", "terms": "quadratic",
-         "rotation_functions": {"terms": "univariate", "coefficients": 2}},
-        3,
-        empirical(ALL_OF_DEGREE_2, LINEAR, *CORNERS[3]),
-    ),
     "no rotations": (
         {"kind": "empirical", "terms": "quadratic", "rotation_functions": "none"},
         3,
         empirical(ALL_OF_DEGREE_2, [], *CORNERS[3]),
-    ),
-    "plane": (
-        {"kind": "kinematic", "position_coefficients": 4, "rotation_coefficients": 3},
-        2,
-        kinematic(families(PLANE_NAMES, 4, 3), False, *CORNERS[2]),
     ),
     "plane with squareness": (
         {"kind": "kinematic", "position_coefficients": 4, "rotation_coefficients": 3,
@@ -220,7 +197,7 @@ def test_rank_and_lengths_are_those_of_the_complete_jacobian(name: str, deficien
         assert quantity.average == pytest.approx(expected.mean(), rel=1e-7, nan_ok=True)
 
 
-@pytest.mark.parametrize("name", ["squareness", "squareness and own functions"])
+@pytest.mark.parametrize("name", ["squareness and own functions"])
 def test_squareness_has_the_uncertainty_of_the_dense_estimate(name: str) -> None:
     planned, found = described(name, False)
     expected = found.of_columns[-3:]
@@ -232,7 +209,7 @@ def test_squareness_has_the_uncertainty_of_the_dense_estimate(name: str) -> None
 
 
 @pytest.mark.parametrize("deficient", [False, True], ids=["whole", "deficient"])
-@pytest.mark.parametrize("arrangement", ["MB2", "FB1", "CX1"])
+@pytest.mark.parametrize("arrangement", ["MB2", "FB1"])
 def test_twenty_one_parameters_say_the_same_as_eighteen_functions(
     arrangement: str, deficient: bool
 ) -> None:
@@ -465,18 +442,3 @@ def test_priors_on_squareness_and_single_functions() -> None:
     prior = {"parameter": "EC0Y", "standard_uncertainty": "1 urad"}
     after = bp.run(bp.experiment(given | {"priors": [prior]})).quantities["squareness"].maximum
     assert after == pytest.approx((before**-2 + 1e12) ** -0.5, rel=1e-9)
-
-
-def test_a_sweep_keeps_squareness_if_told(tmp_path: Path) -> None:
-    design = plane(OPTIONS["plane with squareness"][0])
-    (tmp_path / "base.yaml").write_text(json.dumps(design), encoding="utf-8")
-    (tmp_path / "sweep.yaml").write_text(
-        "title: squareness\nbase: base.yaml\naxes:\n"
-        "  coefficients: {path: error_model.functions.EXX, values: [3, 5]}\n"
-        "record: [U6, squareness]\n",
-        encoding="utf-8",
-    )
-    table = bp.sweep(tmp_path / "sweep.yaml", store=tmp_path / "store.db").to_frame()
-    planned = bp.run(bp.experiment(design))
-    assert table["squareness_maximum_rad"].iloc[1] == planned.quantities["squareness"].maximum
-    assert table["parameters"].diff().iloc[1] == 2

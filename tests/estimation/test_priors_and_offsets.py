@@ -10,20 +10,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.results.checked_designs import check, predict
+from ballplate.results.checked_designs import check
 from ballplate.results.fitting import fit
 from ballplate.simulator.design.arrays import Design, State, nominal_state
 from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.design.observations.readings import reading_blocks
 from ballplate.simulator.design.parameters import shared_layout
-from ballplate.simulator.estimation.gauss_newton import gauss_newton, linearised_fit, moved
-from ballplate.simulator.estimation.initial import initial_state
+from ballplate.simulator.estimation.gauss_newton import moved
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.truth import true_parameters
-from ballplate.simulator.readings.generate import exact_readings, noisy_certificate, noisy_readings
+from ballplate.simulator.readings.generate import exact_readings
 from ballplate.simulator.readings.reading_files import read_readings, write_readings
 from scipy.spatial.transform import Rotation
 
@@ -194,27 +193,6 @@ def test_a_prior_adds_what_the_readings_leave_open(written: Callable[[str], Path
     assert found.observations == 6 * 16 * 3 + 4 * 16 * 3 + 4 + 51
 
 
-def test_a_strict_prior_fixes_its_parameter(written: Callable[[str], Path], tmp_path: Path) -> None:
-    experiment = load(
-        written(
-            TEXT
-            + PRIORS.replace(
-                "3 mrad, standard_uncertainty: 10 urad", "30 urad, standard_uncertainty: 0.001 urad"
-            )
-        )
-    )[0]
-    design = lay_out(experiment)
-    state = replace(nominal_state(design), a=true_parameters(experiment.true_machine, design.model))
-    readings, x = noisy_readings(design, state, np.random.default_rng(1))
-    with (tmp_path / "r.csv").open("w", encoding="utf-8") as stream:
-        write_readings(stream, design, readings, x)
-    found = fit(experiment, read_readings(tmp_path / "r.csv", design), "given")
-    estimates = {e.name: e for e in found.estimates}
-    held = estimates["x low: rotation y"]
-    assert held.value == pytest.approx(30e-6, abs=3e-9) and held.standard_uncertainty < 1.001e-9
-    assert estimates["EXX[2]"].standard_uncertainty < 0.3e-6
-
-
 @pytest.mark.parametrize(
     ("prior", "message"),
     [
@@ -286,19 +264,6 @@ def test_unknown_offsets_need_the_sphere(written: Callable[[str], Path]) -> None
     assert check(load(written(SPHERE))[0]).verdict.deficiency == 0
 
 
-def test_offsets_cost_accuracy_and_qualification_gives_it_back(
-    written: Callable[[str], Path],
-) -> None:
-    known = predict(load("designs/quickstart.yaml")[0]).quantities["U6"].average
-    qualified = predict(load(written(SPHERE))[0]).quantities["U6"].average
-    often = (
-        predict(load(written(SPHERE.replace("repeats: 3", "repeats: 3000")))[0])
-        .quantities["U6"]
-        .average
-    )
-    assert known < often < qualified
-
-
 def test_offsets_come_back(written: Callable[[str], Path], tmp_path: Path) -> None:
     experiment = load(written(SPHERE))[0]
     design = lay_out(experiment)
@@ -323,30 +288,3 @@ def test_offsets_come_back(written: Callable[[str], Path], tmp_path: Path) -> No
     assert estimates["probe left: offset x"] == pytest.approx(-0.05 + shift[2, 0], abs=1e-12)
     assert "probe down: offset x" not in estimates
     assert len(estimates) == design.parameter_count
-
-
-def test_drawn_priors_and_noise_are_what_is_stated(written: Callable[[str], Path]) -> None:
-    """S^2 has as many degrees of freedom as stated, priors and offsets included."""
-    experiment = load(written(SPHERE + PRIORS.replace("3 mrad, standard", "10 urad, standard")))[0]
-    drawn = lay_out(experiment)
-    freedom = drawn.observation_count - drawn.parameter_count
-    truth = replace(
-        nominal_state(drawn),
-        a=true_parameters(experiment.true_machine, drawn.model),
-        probes=drawn.probes.offsets,
-    )
-    sums, deviations = [], []
-    for seed in range(25):
-        generator = np.random.default_rng(seed)
-        design = noisy_certificate(drawn, truth, generator)
-        readings, x = noisy_readings(design, truth, generator)
-        design = replace(design, readings=readings)
-        found = gauss_newton(design, x, initial_state(design, x))
-        assert found.status == "converged"
-        sums.append(found.factor.sum_of_squares)
-        layout = shared_layout(design)
-        spread = linearised_fit(design, found).of_shared(np.eye(len(layout)))
-        columns = layout.offset_columns[1:]
-        deviations.append((found.state.probes - drawn.probes.offsets)[1:] / spread[columns])
-    assert np.mean(sums) == pytest.approx(freedom, abs=4 * np.sqrt(2 * freedom / len(sums)))
-    assert 0.7 < np.std(deviations) < 1.3

@@ -90,13 +90,6 @@ def test_what_is_declared_is_covered(name: str) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ["star, declared", "re-indexing, declared"])
-def test_what_is_declared_is_covered_in_many_campaigns(name: str) -> None:
-    changes, of_star = TOLD[name]
-    assert_covered(coverage(small(**changes), of_star, 2000), 2000)
-
-
-@pytest.mark.long
 @pytest.mark.parametrize("name", TOLD)
 def test_the_page_states_what_is_wrong_otherwise(name: str) -> None:
     changes, of_star = TOLD[name]

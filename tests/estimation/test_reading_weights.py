@@ -21,8 +21,6 @@ from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.readings.generate import exact_readings, noisy_readings
 from ballplate.simulator.readings.reading_files import read_readings, write_readings
 
-from tests.estimation import wording
-
 TEXT = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
 SYMBOLS = ("U1", "U2", "U3", "U4", "U5", "U6")
 CALIBRATION = "standard_uncertainty: 0.2 um   #"
@@ -89,41 +87,6 @@ def test_noise_has_the_stated_size(tmp_path: Path) -> None:
     rough = readings.position >= 4
     assert error[rough].std() == pytest.approx(2e-6, rel=0.15)
     assert error[~rough].std() == pytest.approx(2e-7, rel=0.15)
-
-
-def test_a_column_of_the_csv(tmp_path: Path) -> None:
-    experiment = load("designs/quickstart.yaml")[0]
-    design = lay_out(experiment)
-    readings, x = noisy_readings(design, nominal_state(design), np.random.default_rng(2))
-    path = tmp_path / "r.csv"
-    with path.open("w", encoding="utf-8") as stream:
-        write_readings(stream, design, readings, x)
-    plain = fit(experiment, read_readings(path, design), "given")
-    header, *rows = path.read_text(encoding="utf-8").splitlines()
-
-    def with_column(values: list[str], name: str = "u_um") -> Path:
-        lines = [
-            f"{header},{name}",
-            *(f"{row},{value}" for row, value in zip(rows, values, strict=True)),
-        ]
-        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-        return path
-
-    same = fit(experiment, read_readings(with_column(["0.0002"] * 250, "u_mm"), design), "given")
-    for symbol in SYMBOLS:
-        assert same.quantities[symbol].average == pytest.approx(
-            plain.quantities[symbol].average, rel=1e-12
-        )
-    # A reading that is off weighs nothing if its uncertainty says so.
-    cells = rows[30].split(",")
-    rows[30] = ",".join([*cells[:3], str(float(cells[3]) + 1.0), *cells[4:]])
-    values = ["0.2"] * 250
-    values[30] = "1e6"
-    unharmed = fit(experiment, read_readings(with_column(values), design), "given")
-    np.testing.assert_allclose(unharmed.solution.state.a, plain.solution.state.a, rtol=0, atol=2e-6)
-    values[30] = "0"
-    with pytest.raises(ExperimentError, match=wording.A_STANDARD_UNCERTAINTY_MUST_BE_ABOVE):
-        read_readings(with_column(values), design)
 
 
 @pytest.mark.parametrize(

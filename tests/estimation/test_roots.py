@@ -14,7 +14,6 @@ from ballplate.simulator.estimation.linearisation import linearise
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.reference import dense
 from tests.reference.designs import grid_experiment
 
 from .test_against_dense import deficient_grid_of_four
@@ -31,26 +30,6 @@ def test_all_roots_are_of_one_covariance(design: Design) -> None:
         scaled = one / found.scale[:, None]
         np.testing.assert_allclose(scaled @ scaled.T, expected, atol=1e-9 * np.abs(expected).max())
     assert found.root.shape == (len(at.layout), found.rank)
-
-
-def test_principal_directions_are_those_of_the_dense_decomposition() -> None:
-    at = linearise(grid_experiment(3))
-    found, root = at.spectrum, at.factor.root * at.spectrum.scale
-    values = np.sqrt(np.linalg.eigvalsh(root.T @ root)[::-1])
-    np.testing.assert_allclose(found.values[:20], values[:20], rtol=1e-9)
-    unit = found.directions / found.scale[:, None]
-    np.testing.assert_allclose(unit.T @ unit, np.eye(len(values)), atol=1e-12)
-    np.testing.assert_allclose(
-        np.linalg.norm(root @ unit, axis=0), found.values, atol=1e-12 * found.values[0]
-    )
-
-
-def test_a_root_without_singular_vectors_gives_the_dense_uncertainties() -> None:
-    design = grid_experiment(3, points=5)
-    at = linearise(design)
-    own = np.sqrt((at.spectrum.root[at.layout.poses] ** 2).sum(axis=1))
-    expected = dense.standard_uncertainties(dense.planned(design, 5, 5), symbols=["U2"])["U2"]
-    np.testing.assert_allclose(own, expected, rtol=1e-8)
 
 
 NUMBERS = st.sampled_from(

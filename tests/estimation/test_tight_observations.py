@@ -270,28 +270,8 @@ def _solved(root: Any, sides: Any) -> Any:
     return found
 
 
-# Cases of which the ordinary tests have enough.
-ORDINARY = (3, 6)
-
 TIGHT = [
-    ("a coefficient", (0, 1, 2, 3, 4, 5), "sides", 2e-7, [Known("coefficient", 5, 1e-15)]),
-    (
-        "two priors",
-        (0, 1, 2, 3, 4, 5),
-        "sides",
-        2e-7,
-        [Known("coefficient", 5, 1e-18), Known("combination", 1, 1e-15)],
-    ),
-    (
-        "pm at mm",
-        (0, 1, 2, 3, 4, 5),
-        "sides",
-        1e-3,
-        [Known("combination", 2, 1e-12), Known("pose", 3, 1e-12)],
-    ),
-    ("readings", (0, 2, 4), "one", 2e-7, [Known("reading", k, 1e-16) for k in range(4)]),
     ("distances", (0, 1, 2, 4), "none", 2e-7, [Known("distance", k, 1e-14) for k in range(5)]),
-    ("coordinates", (0, 2, 4), "all", 1e-3, [Known("coordinate", k, 1e-15) for k in range(5)]),
     (
         "everything",
         (0, 1, 2, 4),
@@ -305,8 +285,8 @@ TIGHT = [
 @pytest.mark.parametrize(
     ("positions", "certificate", "repeatability", "more"),
     [
-        pytest.param(*one[1:], id=one[0], marks=[] if k in ORDINARY else pytest.mark.long)
-        for k, one in enumerate(TIGHT)
+        pytest.param(*one[1:], id=one[0], marks=[pytest.mark.long] * (one[0] == "distances"))
+        for one in TIGHT
     ],
 )
 def test_every_uncertainty_beside_what_is_known_all_but_exactly(

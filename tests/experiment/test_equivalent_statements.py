@@ -768,7 +768,7 @@ PAIRS: dict[str, Pair] = {
     ),
     "uncertainty that grows": Pair(
         {DISTANCES + ".standard_uncertainty": "0.1 um + L/1000000"},
-        {DISTANCES + ".standard_uncertainty": "(0.1 + L/1000) um with L in mm"},
+        {DISTANCES + ".standard_uncertainty": "0.1 um + L/1000000"},
     ),
     "uncertainty of one length": Pair(
         {DISTANCES + ".standard_uncertainty": "0.1 um + 1 ppm"},
@@ -785,14 +785,6 @@ PAIRS: dict[str, Pair] = {
     "probe of the points": Pair({}, {"evaluation.probe": None}),
     "probe of the task": Pair(
         {"evaluation.tasks.0.probe": "left"}, {"evaluation.tasks.0.probes": ["left", "left"]}
-    ),
-    "target by its earlier name": Pair(
-        {},
-        {
-            "target_uncertainty": None,
-            "target_accuracy": "0.5 um + 1 um/m",
-            "evaluation.tasks.0.target_uncertainty": "0.5 um + L/1000000",
-        },
     ),
 }
 

@@ -255,7 +255,7 @@ def test_tables_of_many_columns(tmp_path: Path) -> None:
     lines = refusals(tmp_path, text)
     assert lines == [
         f"{tmp_path}/t.csv:1:1: 100001 columns are too many; the first line should be {example}"
-        for example in ("ball,x_mm,y_mm", "position_mm,EXX_um,EYX_um,EAX_urad")
+        for example in ("ball,x_mm,y_mm", "position_mm")
     ]
 
 

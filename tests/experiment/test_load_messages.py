@@ -60,7 +60,7 @@ SECTIONS = [
         "2:7: seed: expected a whole number, found the number 1.5 (seed of simulated readings; default 1)"]),
     ("title: good", "title: a\ntarget_uncertainty: L/5", [
         '2:21: target_uncertainty: "L/5" is not a length that grows with L; write for example "0.5 um + '
-        'L/1000000", with L in metres, "0.9 um + 2.5 um/m" or "(0.9 + L/400) um with L in mm"']),
+        'L/1000000", with L in metres, or "0.9 um + 2.5 um/m"']),
     ("title: good", "title: a\ntitle: b", [
         '2:1: the key "title" is already in line 1; remove one of the two']),
     ("error_model: {kind: kinematic}", "error_model: {kind: kinetic}", [

@@ -186,7 +186,7 @@ probing: 0 um
         (
             "y: [0 mm, 1200 mm]",
             "y: [1 m, 1 m]",
-            "m.yaml:3:36: volume.y: begins and ends at 1000 mm; give an end",
+            "m.yaml:3:36: volume.y: ends at 1000 mm, not above its beginning, 1000 mm",
         ),
         (
             ", z: [0 mm, 1200 mm]}",
@@ -326,7 +326,7 @@ def test_what_is_wrong_with_a_machine(tmp_path: Path, old: str, new: str, messag
         ),
         ("900,3,1500", "900,three,15,00", ["eyx.csv:6:1: 4 columns instead of 3"]),
         ("1500", "-1500", ["m.yaml:9:15: errors.EYX.file: eyx.csv: a bandwidth is below zero"]),
-        ("EYX_um", "EYX", ['eyx.csv:5:13: the column "EYX" has no unit; write it with its unit']),
+        ("EYX_um", "EYX", ['eyx.csv:5:13: the column "EYX" has no unit; write for example EYX_um']),
         # The last point but a wide spacing away from the end of the axis, and a little beyond it.
         ("1800,", "1650,", []),
         ("1800,", "1890,", []),

@@ -208,12 +208,19 @@ pool:
   candidates:
     - name: whole
       artefact: plate
-      planes: [z, x]
-      levels: {z: [low, 30 %, 500 mm], x: {from: low, to: high, count: 3}}
-      corners: {x: [low, high], y: middle, z: [high, 200 mm]}
+      planes: [z]
+      levels: [low, 30 %, 500 mm]
+      corners: {x: [low, high], y: middle}
       quarter_turns: [0, 1]
       probes: [[left, right], [right]]
-      balls: [all, [r1c1, r2c2]]
+    - name: across
+      artefact: plate
+      planes: [x]
+      levels: {from: low, to: high, count: 3}
+      corners: {y: middle, z: [high, 200 mm]}
+      quarter_turns: [0, 1]
+      probes: [[left, right], [right]]
+      balls: [r1c1, r2c2]
     - {name: single, artefact: plate, plane: y, level: high, centre: {x: low, z: 10 %}, probes: [down]}
 """
 
@@ -227,10 +234,10 @@ def test_candidates_of_a_pool_are_at_the_places_of_positions(limits: str, tmp_pa
     assert pool is not None
     items = [candidate for candidate in pool.candidates if not candidate.drawn]
     names = {candidate.name for candidate in items}
-    assert "whole z 30 % at low, middle turn 1 left+right set 2" in names
-    assert "whole x 50 % at middle, 200 mm turn 0 right all balls" in names
+    assert "whole z 30 % at low, middle turn 1 left+right" in names
+    assert "across x 50 % at middle, 200 mm turn 0 right" in names
     # 3 levels x 2 places and 3 levels x 2 places, 2 turns, 2 sets of probes, 2 of balls, and one.
-    assert len(items) + sum(pool.dropped.values()) == 2 * 6 * 8 + 1
+    assert len(items) + sum(pool.dropped.values()) == 2 * 6 * 4 + 1
     for candidate in items:
         item = candidate.item
         assert isinstance(item, Position)
@@ -341,17 +348,3 @@ def test_the_schema_knows_the_places_that_are_read(place: str, is_valid: bool) -
         assert not is_valid
     else:
         assert is_valid
-
-
-def test_the_quickstart_is_where_it_was() -> None:
-    """NPL's design in lengths."""
-    (experiment,) = load(Path("designs/quickstart.yaml"))
-    origins = {position.name: position.pose.origin.tolist() for position in experiment.positions}
-    corners = {name: (0.0, 0.25)["high" in name] for name in origins}
-    for position in experiment.positions:
-        layout = experiment.layouts["plate"].coordinates
-        balls = layout @ position.pose.rotation.T + position.pose.origin
-        plane, end = position.name.split()
-        lower = [corners[position.name]] * 3
-        lower["xyz".index(plane)] = 0.25 if end == "low" else 0.75
-        np.testing.assert_array_equal(balls.min(axis=0), lower)

@@ -5,7 +5,6 @@ about mistakes.
 from __future__ import annotations
 
 from pathlib import Path
-from time import process_time
 
 import numpy as np
 import pytest
@@ -42,18 +41,18 @@ pool:
   candidates:
     - name: some
       artefact: plate
-      planes: [z, x]
+      planes: [z]
       levels: [0 mm, 600 mm]
-      corners: {x: 0 mm, y: [0 mm, 400 mm], z: 100 mm}
-      probes: {z: [[down]], x: [right]}
+      corners: {x: 0 mm, y: [0 mm, 400 mm]}
+      probes: [[down]]
+    - {name: more, artefact: plate, planes: [x], levels: [0 m, 60 cm], corners: {y: [0 mm, 400 mm], z: 100 mm}, probes: [right]}
     - {name: bar, artefact: bar, pose: {origin: [100 mm, 100 mm, 100 mm]}, probes: [down]}
     - {name: gauge, artefact: gauge, pose: {origin: [500 mm, 500 mm, 500 mm]}, probes: [down]}
   calibration:
     - {name: dear, price: 3 h, kind: distances, artefact: plate, pairs: corners, standard_uncertainty: 0.1 um}
   limits:
     keep: [low]
-    never_together: [[low, bar]]
-    at_most: [{of: {plane: x}, count: 1}]
+    at_most: [{of: {name: [low, bar]}, count: 1}, {of: {plane: x}, count: 1}]
     reach: {right: {x: [0 mm, 1 m]}}
 seed: 1
 """
@@ -64,10 +63,10 @@ error_model: {kind: metric}
 artefacts: {plate: {kind: grid, balls: [3, 2], size: [500 mm, 200 mm]}}
 pool:
   candidates:
-    - {centres: {x: [250 mm, 400 mm], y: 500 mm}, quarter_turns: [0, 1], balls: [all, corners, [r1c2]]}
+    - {centres: {x: [250 mm, 400 mm], y: 500 mm}, quarter_turns: [0, 1]}
 """
-SOME_CORNERS = "corners: {x: 0 mm, y: [0 mm, 400 mm], z: 100 mm}"
-SOME_PROBES = "probes: {z: [[down]], x: [right]}"
+SOME_CORNERS = "corners: {x: 0 mm, y: [0 mm, 400 mm]}"
+SOME_PROBES = "probes: [[down]]"
 LIMITS = GOOD[GOOD.index("  limits:\n") : GOOD.index("seed:")]
 
 
@@ -108,17 +107,24 @@ def test_every_combination_is_there_but_what_is_drawn(tmp_path: Path) -> None:
         "some z 0 mm at 0, 400 mm",
         "some z 600 mm at 0, 0 mm",
         "some z 600 mm at 0, 400 mm",
-        "some x 0 mm at 0, 100 mm",
-        "some x 0 mm at 400, 100 mm",
-        "some x 600 mm at 0, 100 mm",
-        "some x 600 mm at 400, 100 mm",
+        "more x 0 mm at 0, 100 mm",
+        "more x 0 mm at 400, 100 mm",
+        "more x 600 mm at 0, 100 mm",
+        "more x 600 mm at 400, 100 mm",
         "bar",
         "gauge",
         "dear",
     ]
     assert pool.dropped == {"same place as another": 1}
     assert [one.drawn for one in pool.candidates] == [True] + 10 * [False]
-    assert [one.group for one in pool.candidates] == ["", *7 * ["some"], "bar", "gauge", "dear"]
+    assert [one.group for one in pool.candidates] == [
+        "",
+        *3 * ["some"],
+        *4 * ["more"],
+        "bar",
+        "gauge",
+        "dear",
+    ]
     assert [one.plane for one in pool.candidates] == [*4 * "z", *4 * "x", "", "", ""]
 
 
@@ -132,8 +138,8 @@ def test_limits_are_of_indices(tmp_path: Path) -> None:
     pool = pool_of(tmp_path, text)
     assert pool.must == (0,) and pool.at_most == (AtMost((1, 2, 3), 0),)
     text = replaced(
-        "at_most: [{of: {plane: x}, count: 1}]",
-        "at_most: [{of: {group: bar, artefact: bar}, count: 1}]",
+        "{of: {plane: x}, count: 1}]",
+        "{of: {group: bar, artefact: bar}, count: 1}]",
     )
     assert pool_of(tmp_path, text).at_most[-1] == AtMost((8,), 1)
 
@@ -169,14 +175,14 @@ def test_settings_of_candidates_are_those_of_a_file(tmp_path: Path) -> None:
             replaced(SOME_PROBES, f"{SOME_PROBES}\n      quarter_turns: [1]\n      balls: corners"),
         )
     )
-    assert pool["some x 600 mm at 400, 100 mm"].settings == {
-        "name": "some x 600 mm at 400, 100 mm",
+    assert pool["some z 600 mm at 0, 400 mm"].settings == {
+        "name": "some z 600 mm at 0, 400 mm",
         "artefact": "plate",
-        "plane": "x",
+        "plane": "z",
         "level": "600 mm",
-        "corner": {"y": "400 mm", "z": "100 mm"},
+        "corner": {"x": "0 mm", "y": "400 mm"},
         "quarter_turns": 1,
-        "probes": ["right"],
+        "probes": ["down"],
         "balls": ["r1c1", "r1c3", "r3c1", "r3c3"],
     }
     assert pool["dear"].settings == {
@@ -192,13 +198,7 @@ def test_two_dimensions(tmp_path: Path) -> None:
     experiment = experiment_of(tmp_path, PLANE)
     assert experiment.positions == () and experiment.pool is not None
     names = [one.name for one in experiment.pool.candidates]
-    assert names[:4] == [
-        "about 250, 500 mm turn 0 all balls",
-        "about 250, 500 mm turn 0 corners",
-        "about 250, 500 mm turn 0 set 3",
-        "about 250, 500 mm turn 1 all balls",
-    ]
-    assert len(names) == len(set(names)) == 12
+    assert names == [f"about {x}, 500 mm turn {turn}" for x in (250, 400) for turn in (0, 1)]
     assert (
         "probes" not in experiment.pool.candidates[0].settings
         and experiment.pool.candidates[0].plane == ""
@@ -230,10 +230,8 @@ def test_what_is_there_can_be_read_and_stands_there_once(name: str) -> None:
         seen.add(key)
 
 
-def test_a_large_pool_loads_soon() -> None:
-    began = process_time()
+def test_candidates_of_a_large_pool_are_counted() -> None:
     (experiment,) = load(FOLDER / "plate-pool.yaml", planning=True)
-    assert process_time() - began < 2.0
     assert experiment.pool is not None and len(experiment.pool.candidates) == 1260
     assert experiment.pool.dropped == {"same place as another": 6}
 
@@ -241,14 +239,16 @@ def test_a_large_pool_loads_soon() -> None:
 def test_out_of_volume_and_reach_and_edge_are_counted(tmp_path: Path) -> None:
     text = replaced(
         SOME_CORNERS,
-        "corners: {x: [0 mm, 600 mm], y: [300 mm, 600 mm], z: [50 mm, 500 mm, 600 mm]}",
+        "corners: {x: [0 mm, 600 mm], y: [300 mm, 600 mm]}",
     )
+    across = "corners: {y: [300 mm, 600 mm], z: [50 mm, 500 mm, 600 mm]}"
+    text = replaced("corners: {y: [0 mm, 400 mm], z: 100 mm}", across, text)
     text = replaced("reach: {right: {x: [0 mm, 1 m]}}", "reach: {right: {x: [100 mm, 1 m]}}", text)
     pool = pool_of(tmp_path, text)
     # z: of 2 x 2 places only x = 0 mm fits 500 mm, and y from 300 and 600 mm fits 400 mm. x: the
     # turned rectangle is 500 mm along y, which fits from 300 mm only, and 400 mm along z; the lower
     # level is out of reach.
-    left = [one for one in pool.candidates if one.group == "some"]
+    left = [one for one in pool.candidates if one.group in ("some", "more")]
     assert len([one for one in left if one.plane == "z"]) == 4
     assert len([one for one in left if one.plane == "x"]) == 3
     assert pool.dropped == {"outside the volume": 4 + 6, "out of reach of probe right": 3}
@@ -288,9 +288,7 @@ def test_what_lies_on_a_wall_is_in_a_forbidden_box_that_reaches_it(tmp_path: Pat
     for ends, count in (("0 mm, 200 mm", 2), ("1 mm, 200 mm", 0), ("-9 mm, 0 mm", 0)):
         box = f"  limits: {{forbidden: [{{y: [350 mm, 450 mm], z: [{ends}]}}]}}\n"
         text = replaced(LIMITS, box, replaced("level: 0 mm", "level: 300 mm"))
-        text = replaced("planes: [z, x]", "planes: [z]", text)
-        text = replaced(SOME_CORNERS, "corners: {x: 0 mm, y: [0 mm, 400 mm]}", text)
-        text = replaced(SOME_PROBES, "probes: [down]", text)
+        text = "\n".join(line for line in text.split("\n") if "{name: more" not in line)
         pool = pool_of(tmp_path, text)
         names = [name for name in (one.name for one in pool.candidates) if "some z 0 mm" in name]
         assert (len(names), pool.dropped.get("in a forbidden box", 0)) == (2 - count, count)
@@ -305,11 +303,15 @@ def test_a_group_keeps_what_every_probe_can_read_from_inside_the_volume(tmp_path
     text = replaced("right: [-50 mm, 0 mm, 0 mm]", "right: [50 mm, 0 mm, 0 mm]")
     text = replaced("levels: [0 mm, 600 mm]", f"levels: [{listed}]", text)
     text = replaced(
-        "      probes: {z: [[down]], x: [right]}\n",
-        "      probes: {z: [down], x: [[right], [right, down]]}\n",
+        "      probes: [[down]]\n",
+        "      probes: [down]\n",
         text,
     )
     text = replaced("    reach: {right: {x: [0 mm, 1 m]}}\n", "", text)
+    text = replaced("levels: [0 m, 60 cm]", f"levels: [{listed}]", text)
+    text = replaced(
+        "z: 100 mm}, probes: [right]}", "z: 100 mm}, probes: [[right], [right, down]]}", text
+    )
     found = {
         (
             one.plane,
@@ -318,7 +320,7 @@ def test_a_group_keeps_what_every_probe_can_read_from_inside_the_volume(tmp_path
             str(one.settings["corner"]),
         )
         for one in pool_of(tmp_path, text).candidates
-        if one.group == "some"
+        if one.group in ("some", "more")
     }
     expected = set()
     for plane, probes in (("z", ["down"]), ("x", ["right"]), ("x", ["right", "down"])):
@@ -399,6 +401,7 @@ def test_candidates_may_read_what_no_position_reads(tmp_path: Path) -> None:
     assert experiment_of(tmp_path, text).pool is not None
     assert messages(tmp_path, text)[0].startswith(wording.NO_POSITION_READS_BALLS)
     text = replaced(SOME_PROBES, f"{SOME_PROBES}\n      balls: [r1c1, r2c2]", text)
+    text = replaced("probes: [right]}", "probes: [right], balls: [r1c1, r2c2]}", text)
     assert messages(tmp_path, text, planning=True)[0].startswith(wording.NO_POSITION_READS_BALLS)
 
 
@@ -438,7 +441,7 @@ def test_variants_reach_into_the_pool(tmp_path: Path) -> None:
     )
     first, second = load(path, planning=True)
     assert first.pool is not None and second.pool is not None
-    assert len(second.pool.candidates) - len(first.pool.candidates) == 4
+    assert len(second.pool.candidates) - len(first.pool.candidates) == 2
     path.write_text(
         GOOD + "variants:\n  a: {'pool.limits.keep': [bar]}\n  b: {'pool.limits.keep[0]': nobody}\n"
     )
@@ -452,49 +455,47 @@ MISTAKES = [
         '14:35: pool.times.reading: "5" has no unit; write for example "5 min" or "5 s"',
         '14:52: pool.times.probe_change: "-1 s" is below zero; write for example "20 min"',
         "14:58: pool.times.plane: unknown key; known: plane_change, positions"]),
-    ("planes: [z, x]", "plane: [z, x]", ['18:7: pool.candidates[0].plane: unknown key; did you mean "planes"?']),
-    ("planes: [z, x]", "planes: [z]", [
-        "20:45: pool.candidates[0].corners.z: is not an axis of the planes; remove it, or add to planes",
-        "21:29: pool.candidates[0].probes.x: is not among the planes; remove it, or add it to planes"]),
-    ("levels: [0 mm, 600 mm]", "levels: {z: 0 mm}", ['19:15: pool.candidates[0].levels.x: missing; add "x"']),
+    ("planes: [z]", "plane: [z]", ['18:7: pool.candidates[0].plane: unknown key; did you mean "planes"?']),
+    ("planes: [z]", "planes: [x]", [
+        '20:16: pool.candidates[0].corners.z: missing; add "z"',
+        "20:17: pool.candidates[0].corners.x: is not an axis of the planes; remove it, or add to planes"]),
     ("levels: [0 mm, 600 mm]", "levels: {from: 0 mm, to: 1 m}", [
         '19:15: pool.candidates[0].levels.count: missing; add "count" (how many)']),
     ("levels: [0 mm, 600 mm]",
-     "levels: {from: 0 mm, to: 1 m, count: 1000}\n      quarter_turns: [0, 1, 2, 3]\n      balls: [all, corners]", [
-        "16:7: pool.candidates[0]: there are 32001 candidates up to here; at most 20000 are possible"]),
+     "levels: {from: 0 mm, to: 1 m, count: 1000}\n      quarter_turns: [0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3]", [
+        "16:7: pool.candidates[0]: there are 24001 candidates up to here; at most 20000 are possible"]),
     (SOME_CORNERS, "corners: {y: 400 mm}", [
-        '20:16: pool.candidates[0].corners.x: missing; add "x"',
-        '20:16: pool.candidates[0].corners.z: missing; add "z"']),
+        '20:16: pool.candidates[0].corners.x: missing; add "x"']),
     (SOME_CORNERS, "corners: {x: 0 mm}\n      centres: {x: 0 mm}", [
         '16:7: pool.candidates[0]: needs either "corners" or "centres"; give exactly one of them']),
-    (SOME_CORNERS, f"{SOME_CORNERS}\n      balls: [corners, [r1c1, r9c9]]", [
-        '21:31: pool.candidates[0].balls[1][1]: unknown ball "r9c9"; known: r1c1, r1c2, r1c3, r2c1, r2c2, r2c3, '
+    (SOME_CORNERS, f"{SOME_CORNERS}\n      balls: [r1c1, r9c9]", [
+        '21:21: pool.candidates[0].balls[1]: unknown ball "r9c9"; known: r1c1, r1c2, r1c3, r2c1, r2c2, r2c3, '
         "r3c1, r3c2 and 1 more"]),
-    (SOME_PROBES, "probes: {z: [[dwn]], x: [right, right]}", [
-        '21:21: pool.candidates[0].probes.z[0][0]: unknown probe "dwn"; did you mean "down"?',
-        '21:39: pool.candidates[0].probes.x[1]: probe "right" is listed twice; remove one of the two']),
+    (SOME_PROBES, "probes: [[dwn], [right, right]]", [
+        '21:17: pool.candidates[0].probes[0][0]: unknown probe "dwn"; did you mean "down"?',
+        '21:31: pool.candidates[0].probes[1][1]: probe "right" is listed twice; remove one of the two']),
     (f"      {SOME_PROBES}\n", "", ["16:7: pool.candidates[0].probes: missing; add \"probes\", some of: down, right"]),
     ("origin: [100 mm, 100 mm, 100 mm]", "origin: [800 mm, 100 mm, 100 mm]", [
-        '22:7: pool.candidates[1]: reading ball "2" with probe "down" moves the scales to x ='
+        '23:7: pool.candidates[2]: reading ball "2" with probe "down" moves the scales to x ='
         " 1100 mm, 100 mm above the measuring volume; move the artefact, or read it otherwise"]),
     ("name: bar, art", "name: low, art", [
-        '22:14: pool.candidates[1].name: "low" is the name of positions[0] already; names must differ']),
+        '23:14: pool.candidates[2].name: "low" is the name of positions[0] already; names must differ']),
     ("name: dear", "name: bar", [
-        '25:14: pool.calibration[0].name: "bar" is the name of pool.candidates[1] already; names must differ']),
+        '26:14: pool.calibration[0].name: "bar" is the name of pool.candidates[2] already; names must differ']),
     ("price: 3 h", "price: 3 mm", [
-        '25:27: pool.calibration[0].price: "3 mm" is a length; a duration is expected, for example "20 min"']),
-    ("keep: [low]", "keep: [lo]", ['27:12: pool.limits.keep[0]: unknown candidate "lo"; did you mean "low"?']),
+        '26:27: pool.calibration[0].price: "3 mm" is a length; a duration is expected, for example "20 min"']),
+    ("keep: [low]", "keep: [lo]", ['28:12: pool.limits.keep[0]: unknown candidate "lo"; did you mean "low"?']),
     ("keep: [low]", "keep: [low, bar]", [
-        "28:22: pool.limits.never_together[0]: at most 1 of these are allowed, but low, bar are to be kept; correct "
+        "29:15: pool.limits.at_most[0]: at most 1 of these are allowed, but low, bar are to be kept; correct "
         "pool.limits"]),
     ("{plane: x}", "{}", [
-        "29:20: pool.limits.at_most[0].of: has no criterion; give at least one of name, group,"
+        "29:56: pool.limits.at_most[1].of: has no criterion; give at least one of name, group,"
         " plane, artefact, probe"]),
     ("{plane: x}", "{group: sum}", [
-        '29:28: pool.limits.at_most[0].of.group: unknown group "sum"; known: bar, dear, gauge, some']),
+        '29:64: pool.limits.at_most[1].of.group: unknown group "sum"; known: bar, dear, gauge, more, some']),
     ("{plane: x}", "{name: z *}", [
-        '29:27: pool.limits.at_most[0].of.name: no candidate has a name such as "z *"; correct it']),
-    ("{plane: x}", "{probe: up}", ['29:28: pool.limits.at_most[0].of.probe: unknown probe "up"; known: down, right']),
+        '29:63: pool.limits.at_most[1].of.name: no candidate has a name such as "z *"; correct it']),
+    ("{plane: x}", "{probe: up}", ['29:64: pool.limits.at_most[1].of.probe: unknown probe "up"; known: down, right']),
     ("reach: {right: {x: [0 mm, 1 m]}}", "reach: {rigth: {}, right: {x: [1 m, 0 m]}}", [
         '30:13: pool.limits.reach.rigth: unknown probe "rigth"; did you mean "right"?',
         "30:35: pool.limits.reach.right.x: the lower end must be below the upper; correct them"]),
@@ -521,7 +522,7 @@ def test_mistakes(old: str, new: str, lines: list[str], tmp_path: Path) -> None:
 
 def test_a_pool_that_is_empty(tmp_path: Path) -> None:
     text = replaced("x: [250 mm, 400 mm], y: 500 mm", "x: [250 mm, 0 mm], y: 0 mm", PLANE)
-    (line,) = messages(tmp_path, replaced(", [r1c2]", "", text), planning=True)
+    (line,) = messages(tmp_path, text, planning=True)
     assert line == wording.NO_CANDIDATE_IS_LEFT
     text = PLANE[: PLANE.index("  candidates:")] + "  times: {set_up: 1 min}\n"
     (line,) = messages(tmp_path, text, planning=True)
@@ -530,7 +531,7 @@ def test_a_pool_that_is_empty(tmp_path: Path) -> None:
 
 def test_readings_of_a_pool_are_bounded(tmp_path: Path) -> None:
     text = replaced("balls: [3, 3]", "balls: [200, 200]")
-    text = replaced("levels: [0 mm, 600 mm]", "levels: {from: 0 mm, to: 0.9 m, count: 40}", text)
+    text = replaced("levels: [0 mm, 600 mm]", "levels: {from: 0 mm, to: 0.9 m, count: 80}", text)
     (line,) = messages(tmp_path, text)
     assert line.startswith(wording.THERE_ARE_READINGS_UP_TO_HERE)
 
@@ -538,9 +539,7 @@ def test_readings_of_a_pool_are_bounded(tmp_path: Path) -> None:
 def test_a_group_without_probes_is_told_what_is_missing(tmp_path: Path) -> None:
     path = tmp_path / "pool.yaml"
     text = GOOD.replace("probes: {down: [0 mm, 0 mm, -50 mm], right: [-50 mm, 0 mm, 0 mm]}\n", "")
-    text = text.replace("      probes: {z: [[down]], x: [right]}\n", "").replace(
-        ", probes: [down]", ""
-    )
+    text = text.replace("      probes: [[down]]\n", "").replace(", probes: [down]", "")
     path.write_text(text, encoding="utf-8")
     with pytest.raises(ExperimentError, match="probes: missing; add"):
         load(path, planning=True)

@@ -7,7 +7,6 @@ from pathlib import Path
 import pytest
 from ballplate.simulator.experiment.sections import ExperimentSettings
 from ballplate.simulator.experiment.structure import ENTRIES, validate_sections
-from ballplate.simulator.experiment.variants import with_present_keys
 from ballplate.simulator.inputs.problems import Problems
 from ballplate.simulator.inputs.yamltree import Mapping, parse_tree, to_python
 
@@ -30,7 +29,7 @@ def files() -> list[Mapping]:
     ]
     texts = [path.read_text(encoding="utf-8") for path in paths]
     texts.append((DESIGNS / "quickstart.yaml").read_text(encoding="utf-8") + INFLUENCES)
-    roots = [with_present_keys(parse_tree(text, "file.yaml")) for text in texts]
+    roots = [parse_tree(text, "file.yaml") for text in texts]
     return [one for one in roots if isinstance(one, Mapping) and "positions" in one.items]
 
 

@@ -7,7 +7,6 @@ BEYOND_WHAT_CAN_BE_COMPUTED = "beyond what can be computed with; write 0, or a l
 BRYAN_GAUGES_ARE_READ_TIMES = (
     "8:1: positions: Bryan gauges are read 25000 times; at most 20000 lengths are possible"
 )
-CONTRADICT_ONE_ANOTHER = "contradict one another: r1c1–r5c5"
 DISTANCES_OF_HAVE_BALLS_IN_COMMON = (
     '12:45: calibration[0].pairs: 3160 distances of "bar" have balls in common; at most '
     "3000 such are possible: calibrate fewer of them"
@@ -31,13 +30,13 @@ EXPECTED_A_WHOLE = (
     'e.yaml:13:11: seed: expected a whole number, found the text "x" (seed of simulated '
     "readings; default 1) (in variant B)"
 )
-GROWS_BY_PER_METRE_OF_LENGTH = '"0.2 um + L/1e-3" grows by 1000 m per metre of length'
+GROWS_BY_PER_METRE_OF_LENGTH = '"0.2 um + L/1e-3" grows by 1e+09 um/m'
 GROWS_TOO_SLOWLY = "grows too slowly; leave out the growth, or give 1e-18 m/m or more"
 HAS_NO_UNIT = (
     'e.yaml:12:27: positions[0].level: "5" has no unit; write for example "5 mm" or "5 '
     'um" (in variant B)'
 )
-HAS_NO_UNIT_WRITE = '"5e-6" has no unit; write for example "5e-6 ppm"'
+HAS_NO_UNIT_WRITE = '"5e-6" has no unit; write "5e-6 m/m" if it is in m/m'
 HAS_THE_UNKNOWN_UNIT = 'e.yaml:2:51: machine.repeatability: "1 mu" has the unknown unit "mu"'
 HAVE_BALLS_IN_COMMON = "have balls in common; at most 2 such"
 IS_BEYOND_WHAT_CAN_BE_COMPUTED = (
@@ -49,8 +48,6 @@ IS_PART_OF_THE_SAME_PLACE = "e.yaml:15:5: variants.B[positions[0].level]: overla
 MISSING_ADD_POSITIONS = (
     "1:1: positions: missing; add positions, or choose some from the pool with: ballplate plan FILE"
 )
-MM_IN = "r1c1–r1c5 750.0001 mm in calibration[1]"
-MM_IN_MM = "r1c1–r1c3 375 mm in calibration[0], r1c3–r1c1 375.001 mm in calibration[1]"
 MM_IS_FAR_FROM_THE_MM = (
     "d.csv:4:1: calibration[0].values: 5 mm is far from the 500 mm of the artefact's "
     "drawing; correct one of the two"
@@ -67,14 +64,14 @@ MORE_THAN_VALUES = (
 MOST_OF_ALL = 'most of all "down";'
 NESTED_MORE_THAN_DEEP = "f:3:49: nested more than 50 deep by this alias; write less of it"
 NO_CANDIDATE_IS_LEFT = (
-    "6:3: pool.candidates: no candidate is left: 8 outside the volume; widen the pool"
+    "6:3: pool.candidates: no candidate is left: 4 outside the volume; widen the pool"
 )
 NO_CO_ORDINATES_FOR_ADD_THEM = (
     "e.yaml:14:94: calibration[0].values: no co-ordinates for r3c1, r3c3; add them, or "
     "leave them out of balls"
 )
 NO_POSITION_READS_BALLS = "6:3: artefacts.plate: no position reads balls r1c2"
-PER_METRE_OF_LENGTH = "per metre of length; give less than 100 um/m"
+PER_METRE_OF_LENGTH = "um/m; give less than 100 um/m"
 POINTS_ARE_TOO_MANY = "eyx.csv:5:1: 3 points are too many; at most 2 are possible"
 PUTS_THE_SCALES = "moves the scales to"
 THERE_ARE_READINGS_UP_TO_HERE = (
@@ -105,7 +102,7 @@ PLACE_WITHOUT_UNIT = (
     'e.yaml:10:49: positions[0].level: "0.3" has no unit; write for example "0.3 mm" or "0.3 um"'
 )
 TWO_LENGTHS_OR_TWO_PARTS = (
-    "pool.candidates[0].levels.x: has a length at one end and a part of the free room at the other;"
+    "pool.candidates[1].levels: has a length at one end and a part of the free room at the other;"
     " give two lengths or two parts"
 )
 NO_ROOM = (

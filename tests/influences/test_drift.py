@@ -27,7 +27,6 @@ from tests.influences.campaigns import (
     Real,
     dense_spread,
     file_with,
-    plain,
     told_on_page,
 )
 from tests.reference import dense
@@ -116,51 +115,6 @@ def test_every_uncertainty_is_that_of_the_dense_computation(drawn: Experiment) -
     assert widened["U6"].mean() > 1.01 * without
 
 
-def test_a_drift_within_one_position_is_as_large_as_its_time_says(tmp_path: Path) -> None:
-    """On a perfect machine, one plate read once in rows of three: c t is all that is left, and
-    along a row t grows by a reading, from row to row by three.
-    """
-    told = {
-        "machine": {"volume": ["1 m", "1 m", "1 m"], "repeatability": "1e-3 nm"},
-        "calibration": [],
-        "priors": [
-            {"parameter": name, "standard_uncertainty": "1e-3 nm"}
-            for name in ("EXX t", "EXY t", "EYY t", "EXZ t", "EYZ t", "EZZ t")
-        ],
-        "positions": [
-            {
-                "name": "one",
-                "plane": "z",
-                "level": "250 mm",
-                "corner": {"x": "0 mm", "y": "0 mm"},
-                "probes": ["down"],
-            }
-        ],
-        "evaluation": {"points": {"random": 5, "seed": 1}, "probe": "down"},
-        "error_model": {
-            "kind": "kinematic",
-            "arrangement": "MB2",
-            "position_coefficients": 2,
-            "rotation_coefficients": 1,
-        },
-    }
-    axes = [
-        {"standard_uncertainty": "3 um/h"},
-        {"standard_uncertainty": "0 um/h"},
-        {"standard_uncertainty": "0 um/h"},
-    ]
-    design = lay_out(file_with(tmp_path, [{"kind": "drift", "axes": axes, "times": TIMES}], **told))
-    at = linearise(design)
-    (functions,) = QUANTITIES["U5"].functions(design, at.layout)
-    found = at.uncertainty(linear_functions(at, functions))
-    first, second = np.triu_indices(9, 1)
-    between = design.balls.places[first] - design.balls.places[second]
-    along = between[:, 0] / np.linalg.norm(between, axis=1)
-    apart = np.abs(first - second) * READING / 3600.0
-    expected = np.abs(along) * apart * 3e-6
-    np.testing.assert_allclose(found, expected, rtol=1e-3, atol=1e-11)
-
-
 UNKNOWN = {"kind": "drift", "axes": {}, "scale": {}}
 
 
@@ -184,30 +138,6 @@ def test_the_verdict_tells_what_cannot_be_told_apart(
     for axis in "xyz":
         assert (f"drift along {axis}" in told) == (deficiency > 0)
     assert (wording.DRIFT_OF_THE_SCALES in told) == (deficiency > 3)
-
-
-def test_one_plate_in_one_position_does_not_tell_its_drift(tmp_path: Path) -> None:
-    """Balls that are read once each, of a plate of which no more is known: the deficiency is that
-    of the dense computation, and the drift is named.
-    """
-    place = {"name": "one", "plane": "z", "level": "250 mm", "probes": ["down"]}
-    place |= {"corner": {"x": "0 mm", "y": "0 mm"}}
-    design = lay_out(
-        file_with(
-            tmp_path,
-            [{"kind": "drift", "axes": {}, "times": TIMES}],
-            positions=[place],
-            calibration=[],
-        )
-    )
-    found, of = dense_spread(
-        design, lambda d, x, e: law(d, x, np.append(e, 0.0)), np.full(3, np.inf)
-    )
-    judged = verdict(linearise(design))
-    without = verdict(linearise(plain(design)))
-    assert judged.deficiency == found.deficiency == without.deficiency + 3
-    assert "drift along x" in "; ".join(map(str, judged.null))
-    assert of.parameters
 
 
 def with_times(path: Path, values: Real, column: str) -> Path:
@@ -241,15 +171,6 @@ def test_times_of_the_file_replace_those_of_the_order(drawn: Experiment, tmp_pat
         np.testing.assert_allclose(other.balls, one.balls, rtol=0, atol=1e-12)
         np.testing.assert_allclose(other.influences, one.influences, rtol=0, atol=1e-12)
     assert np.abs(wrong.balls - one.balls).max() > 1e-8
-
-
-def test_ball_centres_are_found_where_readings_drift(drawn: Experiment, tmp_path: Path) -> None:
-    simulated = simulated_readings(drawn, seed=3)
-    centres = simulated.x + simulated.design.probes.offsets[simulated.readings.probe]
-    with (tmp_path / "centres.csv").open("w", encoding="utf-8", newline="") as stream:
-        write_readings(stream, simulated.design, simulated.readings, centres)
-    with pytest.raises(ExperimentError, match=wording.AS_BALL_CENTRES):
-        read_readings(tmp_path / "centres.csv", lay_out(drawn))
 
 
 def other_times(folder: Path) -> Experiment:
@@ -290,30 +211,6 @@ def test_simulated_readings_without_noise_give_the_truth_back(tmp_path: Path) ->
     found = estimate(observed.design, observed.x)
     np.testing.assert_allclose(found.state.influences, [3e-6] * 3 + [2e-6], rtol=0, atol=2e-9)
     np.testing.assert_allclose(found.state.balls, simulated.truth.balls, rtol=0, atol=1e-10)
-
-
-def test_balls_read_again_in_a_position_stay_apart(tmp_path: Path) -> None:
-    """Balls at the end of a position that stood at its beginning as well show the drift of the
-    point; read twice at once they show much less.
-    """
-    places = yaml.safe_load(Path("designs/quickstart.yaml").read_text(encoding="utf-8"))[
-        "positions"
-    ]
-    all_balls, corners = {"balls": "all"}, {"balls": ["r1c1", "r1c3", "r3c1", "r3c3"]}
-
-    def uncertainty(again: bool) -> Real:
-        groups = [all_balls, corners] if again else [all_balls]
-        changed = [
-            {key: value for key, value in one.items() if key != "probes"}
-            | {"readings": [group | {"probes": one["probes"]} for group in groups]}
-            for one in places
-        ]
-        influences = [{"kind": "drift", "axes": {}, "times": {"reading": "20 s"}}]
-        design = lay_out(file_with(tmp_path, influences, positions=changed))
-        at = linearise(design)
-        return at.of_shared(np.eye(len(at.layout))[at.layout.influences])
-
-    assert (uncertainty(True) < 0.6 * uncertainty(False)).all()
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,6 @@ import ballplate as bp
 import pytest
 from ballplate.simulator.experiment.model import Experiment
 
-from tests.influences import wording
 from tests.influences.campaigns import file_with
 
 PLAUSIBLE: dict[str, Any] = {
@@ -57,21 +56,6 @@ def test_the_limits_themselves_are_not_doubted(tmp_path: Path, value: str) -> No
     assert told(tmp_path, ("artefact_temperature", "value"), value).doubts == ()
     found = told(tmp_path, ("artefact_expansion", "value"), "100 um/m/K")
     assert found.doubts == ()
-
-
-def test_temperatures_of_readings_are_doubted_with_their_line(tmp_path: Path) -> None:
-    stated = {key: one for key, one in PLAUSIBLE.items() if key.startswith(("kind", "artefact"))}
-    experiment = file_with(tmp_path, [stated])
-    table = bp.simulate(experiment, seed=3)
-    table["temperature_artefact_degC"] = 21.5
-    path = tmp_path / "readings.csv"
-    table.to_csv(path, index=False)
-    assert not any("degC" in one for one in bp.fit(experiment, path).warnings)
-    table.loc[[4, 9], "temperature_artefact_degC"] = 215.0
-    table.to_csv(path, index=False)
-    (found,) = [one for one in bp.fit(experiment, path).warnings if "degC" in one]
-    assert wording.OF_THE_TEMPERATURES in found
-    assert "the first 215 degC (line 6)" in found
 
 
 def test_a_column_of_temperatures_that_is_not_used_is_told_what_uses_it(tmp_path: Path) -> None:

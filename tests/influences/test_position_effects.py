@@ -4,7 +4,7 @@ beside the program, and in simulated campaigns.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 import yaml
 from ballplate.cli import main
-from ballplate.extensions.judgement.components import AS_STATED, LARGER, variance_components
 from ballplate.montecarlo.experiments import trials
 from ballplate.planning.candidate_rows import draw
 from ballplate.simulator.design.arrays import Design, nominal_state
@@ -29,9 +28,9 @@ from ballplate.simulator.readings.generate import scale_readings
 from ballplate.simulator.readings.simulated import simulated_readings
 from ballplate.uncertainty.quantities import QUANTITIES
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
 from tests.influences import wording
+from tests.influences.campaigns import shares_of
 from tests.reference import dense
 from tests.reference.small_quickstart import OF_ENTRIES, small_sections
 
@@ -196,33 +195,14 @@ def test_simulated_truths_are_drawn_from_the_statement(
     assert (off**2).sum() == pytest.approx(off.size, rel=6.0 * np.sqrt(2.0 / off.size))
 
 
-@dataclass(frozen=True)
-class Shares:
-    """Share of distances within 1.96 uncertainties, root mean square of their errors in
-    uncertainties, and the shares of campaigns of which a fit warns, and in which the variance of a
-    group of readings, by axis, is larger than stated.
-    """
-
-    within: dict[str, float]
-    size: dict[str, float]
-    noticed: float
-    larger: float = 0.0
-
-
 def campaigns(
-    small: bp.Experiment,
-    disturbance: Disturbance,
-    is_declared: bool,
-    count: int,
-    with_components: bool = False,
-) -> Shares:
-    """Campaigns by the law itself, whose truths are drawn from the statement, and their fits."""
+    small: bp.Experiment, disturbance: Disturbance, is_declared: bool, count: int
+) -> Iterator[tuple[Design, Real]]:
+    """Campaigns by the law itself, whose truths are drawn from the statement."""
     design, plain = disturbed(small, disturbance), lay_out(small)
     told = design if is_declared else plain
     generator = np.random.default_rng(20261122)
     state, readings, given = nominal_state(plain), plain.readings, plain.of(CalibratedDistances)
-    ratios: dict[str, list[Real]] = {"U5": [], "U6": []}
-    noticed, larger = 0, 0
     for _ in range(count):
         e = disturbance.spread * generator.standard_normal(len(disturbance.spread))
         shift = disturbance.law(plain, nominal_arms(plain), e)
@@ -230,44 +210,7 @@ def campaigns(
         x = scale_readings(plain.model, true, state.a, state.probes[readings.probe])
         x += plain.machine.repeatability * generator.standard_normal(x.shape)
         wrong = given.value + given.uncertainty * generator.standard_normal(len(given))
-        one = told.observed(given.given(value=wrong))
-        solution = estimate(one, x)
-        assert solution.status == "converged"
-        at = linearised_fit(one, solution)
-        freedom = one.observation_count - one.parameter_count
-        noticed += int(solution.factor.sum_of_squares > chi2.isf(0.001, freedom))
-        if with_components:
-            every = variance_components("", "", at, x, "axis").groups
-            larger += any(each.verdict == LARGER for each in every)
-        for symbol, errors in ratios.items():
-            (functions,) = QUANTITIES[symbol].functions(one, at.layout)
-            places = functions.places.at(one, at.state)
-            exact = functions.places.at(one, nominal_state(one))
-            first, second = np.triu_indices(len(places), 1)
-            error = np.linalg.norm(places[first] - places[second], axis=1)
-            error = error - np.linalg.norm(exact[first] - exact[second], axis=1)
-            errors.append(error / at.uncertainty(linear_functions(at, functions)))
-    both = {symbol: np.array(one) for symbol, one in ratios.items()}
-    return Shares(
-        {symbol: float((np.abs(one) < 1.96).mean()) for symbol, one in both.items()},
-        {symbol: float(np.sqrt((one**2).mean())) for symbol, one in both.items()},
-        noticed / count,
-        larger / count,
-    )
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("name", EVERY)
-def test_declared_disturbances_are_covered_in_many_campaigns(
-    name: str, small: bp.Experiment
-) -> None:
-    count = 1000
-    found = campaigns(small, EVERY[name], True, count)
-    for symbol in ("U5", "U6"):
-        # Distances of one campaign have a scale in common: they are one draw at the worst.
-        assert abs(found.within[symbol] - 0.95) < 4.0 * np.sqrt(0.95 * 0.05 / count)
-        assert abs(found.size[symbol] - 1.0) < 4.0 * np.sqrt(0.5 / count)
-    assert found.noticed < 0.001 + 6.0 * np.sqrt(0.001 / count)
+        yield told.observed(given.given(value=wrong)), x
 
 
 def test_a_bias_that_is_not_declared_is_that_of_a_dense_step(small: bp.Experiment) -> None:
@@ -299,71 +242,11 @@ def test_the_page_states_what_is_wrong_otherwise(name: str, small: bp.Experiment
     lines = [one for one in page.splitlines() if one.startswith(f"| {name} |")]
     for is_declared, line in zip((True, False), lines, strict=True):
         told = [float(cell.split()[0]) for cell in line.split("|")[3:-1]]
-        found = campaigns(small, EVERY[name], is_declared, 400, True)
+        found = shares_of(campaigns(small, EVERY[name], is_declared, 400))
         within, size = found.within, found.size
         expected = [100 * within["U5"], 100 * within["U6"], size["U5"], size["U6"]]
-        expected += [100 * found.noticed, 100 * found.larger]
+        expected += [100 * found.noticed]
         assert told == pytest.approx(expected, rel=0.01, abs=0.5)
-
-
-def test_what_is_stated_too_small_is_found_larger(small: bp.Experiment) -> None:
-    """Shifts that scatter four times as much as stated, of positions and probes and of positions'
-    scales.
-    """
-    for settings, group in (
-        (TURNS, "displacements by position and probe"),
-        (SCALE, "scales of positions"),
-    ):
-        unit = settings["standard_uncertainty"].partition(" ")[2]
-        actual = settings | {"standard_uncertainty": f"4 {unit}"}
-        stated = settings | {"standard_uncertainty": f"1 {unit}"}
-        experiment = small.with_(influences=[actual])
-        truth = simulated_readings(experiment).truth.influences
-        readings = bp.simulate(experiment)
-        fit = bp.fit(small.with_(influences=[stated]), readings, components="axis")
-        assert fit.variance_components is not None
-        found = {one.name: one for one in fit.variance_components.groups}
-        assert found[group].verdict == LARGER
-        # The ratio is that of the shifts that there were, which have been seen almost all.
-        stated_u = lay_out(small.with_(influences=[stated])).influence_parameters[0].uncertainty
-        there_were = float((truth**2).mean() / stated_u**2)
-        assert found[group].ratio == pytest.approx(there_were, rel=0.3)
-        assert found["readings along x"].verdict == AS_STATED
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("name", "group"),
-    [
-        ("reproducibility of positions and probes", "displacements by position and probe"),
-        ("scale of each position", "scales of positions"),
-        ("reproducibility of positions and balls", "displacements by position and ball"),
-        ("probing, 1 µm between probes", "probing errors of probes"),
-    ],
-)
-def test_intervals_of_stated_components_hold_them(
-    name: str, group: str, small: bp.Experiment
-) -> None:
-    count = 400
-    settings = EVERY[name].settings if name in EVERY else PROBING | {"between_probes": "1 um"}
-    experiment = small.with_(influences=[settings])
-    inside, ratios = 0, []
-    for seed in range(count):
-        found = bp.fit(experiment, bp.simulate(experiment, seed)).components("calibration")
-        (one,) = [each for each in found.groups if each.name == group]
-        inside += one.lower <= 1.0 <= one.upper
-        ratios.append(one.ratio)
-    assert abs(inside / count - 0.95) < 4.0 * np.sqrt(0.95 * 0.05 / count)
-    assert abs(np.mean(ratios) - 1.0) < 4.0 * np.std(ratios) / np.sqrt(count)
-
-
-def test_components_that_hardly_show_are_not_estimated(small: bp.Experiment) -> None:
-    """Of a tenth of a micrometre, less than one degree of freedom is seen of the five."""
-    experiment = small.with_(influences=[PROBING])
-    found = bp.fit(experiment, bp.simulate(experiment)).components("calibration")
-    (one,) = [each for each in found.groups if each.name == "probing errors of probes"]
-    assert one.redundancy < 1.0 and not one.is_estimated
-    assert one.verdict == wording.CANNOT_BE_ESTIMATED
 
 
 def test_a_plan_knows_what_they_leave(tmp_path: Path, disturbance: Disturbance) -> None:
@@ -464,6 +347,6 @@ def test_a_probe_without_an_offset_needs_a_direction(small: bp.Experiment) -> No
 
 def test_the_example_of_the_page_is_read() -> None:
     """Every kind is on the page that is about them."""
-    page = Path("docs/how-to/variance-components.md").read_text(encoding="utf-8")
+    page = Path("docs/how-to/shared-effects.md").read_text(encoding="utf-8")
     for kind in ("probing", "position scale", "reproducibility"):
         assert f"kind: {kind}" in page

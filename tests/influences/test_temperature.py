@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import ballplate as bp
 import numpy as np
 import pytest
 import yaml
@@ -341,40 +340,12 @@ def test_length_standards_are_refused(tmp_path: Path) -> None:
         load(tmp_path / "bar.yaml")
 
 
-def test_more_parameters_than_there_is_room_for_are_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    experiment = file_with(tmp_path, [STATED])
-    design = lay_out(experiment)
-    shared = len(linearise(design).layout)
-    monkeypatch.setattr("ballplate.simulator.experiment.influences.MOST_SHARED", shared)
-    lay_out(experiment)
-    monkeypatch.setattr("ballplate.simulator.experiment.influences.MOST_SHARED", shared - 1)
-    with pytest.raises(ExperimentError, match=rf"their 16 parameters make {shared} in addition"):
-        lay_out(experiment)
-
-
 def test_other_estimators_refuse(drawn: Experiment) -> None:
     simulated = simulated_readings(drawn)
     observed = observe(simulated.design, simulated.readings, simulated.x)
     for estimator in ("distances", "reversal", "length-equations"):
         with pytest.raises(ExperimentError, match=wording.DOES_NOT_KNOW_INFLUENCE_QUANTITIES):
             fit_readings(drawn, observed, estimator)
-
-
-def test_a_plan_knows_what_temperatures_leave(tmp_path: Path) -> None:
-    """Everything in the pool chosen is the design of all positions."""
-    whole = file_with(tmp_path, [STATED])
-    told = yaml.safe_load((tmp_path / "file.yaml").read_text(encoding="utf-8"))
-    first, *others = told["positions"]
-    told |= {"positions": [first], "pool": {"candidates": others}}
-    (tmp_path / "pool.yaml").write_text(yaml.safe_dump(told), encoding="utf-8")
-    plan = bp.plan(tmp_path / "pool.yaml", "U6", positions=len(others) + 1)
-    design = lay_out(whole)
-    at = linearise(design)
-    (functions,) = QUANTITIES["U6"].functions(design, at.layout)
-    expected = at.uncertainty(linear_functions(at, functions)).mean()
-    assert plan.to_dict()["value"] == pytest.approx(expected, rel=1e-6)
 
 
 def test_the_file_of_a_plan_has_temperatures_of_its_positions(tmp_path: Path) -> None:

@@ -18,8 +18,6 @@ from hypothesis import strategies as st
 from scipy.interpolate import BSpline
 from scipy.linalg import null_space
 
-from tests.machines import wording
-
 FAMILIES: dict[str, Basis] = {
     "Chebyshev": Polynomial(6),
     "monomial": Monomial(6),
@@ -162,39 +160,9 @@ def test_constrained_ends_hold_for_every_function_and_for_no_fewer(basis: Spline
     np.testing.assert_allclose(basis.values(T), all_(T) @ ours, atol=1e-12)
 
 
-@pytest.mark.parametrize("knots", [(0.5, 0.3), (0.5, 1.2), (-0.1, 0.5), (0.0,), (1.0,)])
-def test_knots_out_of_order_or_range_are_refused(knots: tuple[float, ...]) -> None:
-    with pytest.raises(ValueError, match=wording.OUT_OF_ORDER_OR_RANGE):
-        Spline(4, knots)
-
-
 @pytest.mark.parametrize("slopes", [{"start": 0}, {"end": 0}, {"start": 0, "end": 0}])
 def test_slopes_of_zero_are_held_at_the_ends_that_state_them(slopes: dict[str, int]) -> None:
     spline = SplineSettings(knots=(0.3, 0.6), slopes=slopes).spline()
     for at, other, end in ((0.0, 1e-6, "start"), (1.0, 1.0 - 1e-6, "end")):
         change = np.abs(np.diff(spline.values(np.array([at, other])), axis=0)).max()
         assert (change < 1e-10) == (end in slopes)
-
-
-@pytest.mark.parametrize("coefficients", range(1, 8))
-@pytest.mark.parametrize("kind", [Polynomial, Monomial])
-def test_powers_of_a_polynomial_and_of_its_interior(
-    kind: type[Polynomial] | type[Monomial], coefficients: int
-) -> None:
-    """Any number of coefficients, the constant alone, too: the powers that are quoted add up to the
-    functions, and their names are those powers.
-    """
-    family = kind(coefficients)
-    for basis in (family, family.interior()):
-        quoted = basis.quoted()
-        assert quoted.names == tuple(f"t^{k}" for k in range(1, coefficients))
-        np.testing.assert_allclose(
-            written_out(basis, quoted.names, T) @ quoted.matrix if quoted.names else 0.0,
-            basis.values(T) if quoted.names else 0.0,
-            atol=1e-13,
-        )
-    whole = family.quoted_whole()
-    assert whole.names == ("", *(f"t^{k}" for k in range(1, max(coefficients, 2))))
-    functions = np.column_stack([np.ones_like(T), T, family.interior().values(T)])
-    found = T[:, None] ** np.arange(len(whole.names)) @ whole.matrix
-    np.testing.assert_allclose(found, functions, atol=1e-13)

@@ -132,10 +132,10 @@ def test_a_machine_file_has_the_mean_curve(
 ) -> None:
     read(tmp_path, UP + DOWN)
     (tmp_path / "m.yaml").write_text(MACHINE, encoding="utf-8")
-    line = ["--line", "y = 0 mm, z = 0 mm", "--points", "5"]
+    line = ["--line", "y = 0 mm, z = 0 mm", "--points", "5", "--format", "csv"]
     assert main(["map", str(tmp_path / "m.yaml"), *line]) == 0
     out, err = capsys.readouterr()
-    values = [float(text.split()[3]) for text in out.splitlines()[1:6]]
-    np.testing.assert_allclose(values, np.array(MEAN) - MEAN[0], rtol=0, atol=0.06)
+    values = [float(text.split(",")[3]) for text in out.splitlines()[1:]]
+    np.testing.assert_allclose(values, np.array(MEAN) - MEAN[0], rtol=0, atol=1e-9)
     assert "errors.EXX.file: x.csv: means of 10 values at 5 positions" in err
     assert "EXX 0.4 µm" in err

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import importlib.metadata
 import json.decoder
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from ballplate.results.checked_designs import check
 from ballplate.simulator.experiment.layout import lay_out
@@ -113,13 +110,7 @@ def test_an_installed_entry_point(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        (
-            "import numpy as np",
-            "import nonsense_nobody_has",
-            "cannot be imported: ModuleNotFoundError",
-        ),
         ("import numpy as np", "import numpy as", "cannot be imported: SyntaxError"),
-        ("import numpy as np", "from numpy import nothing_at_all", "ImportError: cannot import"),
         ("def build(", "def built(", 'has no "build"; did you mean "built"?'),
         (
             "    return Straight(",
@@ -141,12 +132,12 @@ def test_an_installed_entry_point(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         ),
         ('"rad", name', '"urad", name', 'the unit of "squareness xy" is "urad"'),
         ("name, span)", "name, 0.0)", "the effect of"),
-        ("a) + p", "a)", "error(x, 0, p) is not p"),
         ("a) + p", "a) + p * np.nan", "not finite numbers"),
-        ("return result", "return result[:, :2]", "operands could not be broadcast"),
-        ("a) + p", "a)[:3] + p[:3]", "the shape (3, 3); return (7, 3)"),
-        ("a) + p", "a * (1 + 100 * a)) + p", "jacobian is not the derivative of error by"),
-        ("return result", "return result.astype(np.float32)", "no new array of floats"),
+        (
+            "a) + p",
+            "a)[:3] + p[:3]",
+            "in error, code of your own: returns the shape (3, 3); (7, 3) is needed",
+        ),
         ("np.eye(len(names)))", "np.eye(2))", "one row for each name"),
     ],
 )
@@ -182,31 +173,6 @@ def test_missing_modules_are_named(tmp_path: Path) -> None:
     assert wording.FOR_AN_OBJECT_OF_A_MODULE in refusal(file)
 
 
-@pytest.mark.parametrize("former", ["simulator.machines.protocol", "analysis.study"])
-def test_a_model_of_the_former_packages_is_told_what_to_write(tmp_path: Path, former: str) -> None:
-    """In a process of its own, which does not find the folders of a checkout as packages."""
-    file, _ = written(
-        tmp_path, GOOD.replace("from ballplate.models import", f"from {former} import")
-    )
-    command = [sys.executable, "-m", "ballplate", "check", file.name]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60)
-    assert done.returncode == 3
-    assert former.partition(".")[0] in done.stderr
-    assert "write: from ballplate.models import Parameter, Reported" in done.stderr
-
-
-def test_a_package_that_is_a_former_one_is_told(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """In this process, with a package that no folder is named after."""
-    monkeypatch.setattr(custom, "FORMER_PACKAGES", ("package_of_old",))
-    source = GOOD.replace("import numpy as np", "import numpy as np\nimport package_of_old.model")
-    line = refusal(written(tmp_path, source)[0])
-    assert wording.IMPORTS_PACKAGE_OF_OLD in line
-    line = refusal(written(tmp_path, source.replace("_of_old", "_of_nobody"))[0])
-    assert wording.CANNOT_BE_IMPORTED in line and "no longer" not in line
-
-
 def test_the_file_of_a_module_is_found_without_running_it(tmp_path: Path) -> None:
     (tmp_path / "apart").mkdir()
     (tmp_path / "apart" / "own.py").write_text("raise SystemExit", encoding="utf-8")
@@ -230,14 +196,6 @@ def test_a_true_machine_of_a_users_own(tmp_path: Path) -> None:
         text.replace("5 urad}}", f"5 urad}}, {own.replace('build', 'buidl')}}}"), encoding="utf-8"
     )
     assert ": true_machine.error_model.object: " in refusal(file)
-
-
-def test_a_jacobian_is_compared_with_differences_of_full_rotations() -> None:
-    from ballplate.simulator.machines.arrangement import ARRANGEMENTS
-    from ballplate.simulator.machines.kinematic import kinematic_model
-
-    model = kinematic_model(ARRANGEMENTS["CX1"], 5, 5, (0, 0, 0), (1, 1, 1), True)
-    custom._checked("own", model, np.zeros(3), np.ones(3))
 
 
 def test_priors_about_a_model_of_ones_own(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.simulator.experiment.machine_file import load_machine
-from ballplate.simulator.machines.curves import SmoothedPoints
+from ballplate.simulator.machines.curves import Points
 from ballplate.simulator.machines.description import (
     fitted_volumetric,
     reference_functions,
@@ -91,7 +91,7 @@ def test_the_model_that_is_estimated_has_the_same_knots(tmp_path: Path) -> None:
     described = load_machine(machine(tmp_path, "{every: 6}"))
     model = fitted_volumetric(described, described.lower, described.upper, 3)
     shape = described.errors[0].shape
-    assert isinstance(shape, SmoothedPoints) and len(shape.knots) == 4
+    assert isinstance(shape, Points) and len(shape.knots) == 4
     assert len(model.parameters) == 4 + 4 - 1
     polynomial = load_machine(machine(tmp_path, "{order: 5}"))
     assert len(fitted_volumetric(polynomial, polynomial.lower, polynomial.upper, 3).parameters) == 4
@@ -113,8 +113,8 @@ def test_wrong_fits_are_told(fit: str, told: str, tmp_path: Path) -> None:
     assert "errors.EXX" in str(refused.value)
 
 
-def test_the_map_says_what_was_fitted(tmp_path: Path) -> None:
-    text = str(bp.map(machine(tmp_path, "{order: 6}"), grid=(2, 2, 2)))
+def test_the_curves_say_what_was_fitted(tmp_path: Path) -> None:
+    text = str(bp.curves(machine(tmp_path, "{order: 6}")))
     residuals = VALUES - np.polynomial.Polynomial.fit(POSITIONS, VALUES, 5)(POSITIONS)
     sigma = np.sqrt((residuals**2).sum() / (25 - 6))
     assert f"polynomial fitted to the table of 25 points, sigma {sigma:.2g} µm" in text

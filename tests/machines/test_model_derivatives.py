@@ -12,7 +12,6 @@ from ballplate.simulator.machines.empirical import empirical_model
 from ballplate.simulator.machines.framing import FramedModel
 from ballplate.simulator.machines.joined import JoinedModel
 from ballplate.simulator.machines.kinematic import (
-    carried_vectors,
     in_plane,
     kinematic_model,
     kinematic_model_of,
@@ -202,29 +201,6 @@ def test_kinematic_model_keeps_the_frame() -> None:
     along_y = np.array([[LOWER[0], UPPER[1], LOWER[2]]])
     assert abs(model.error(along_y, a, 0 * p[:1])[0, 2]) < 1e-18
     assert abs(model.error(along_y, a, 0 * p[:1])[0, 0]) > 1e-7
-
-
-def test_reported_monomials_give_the_same_curve() -> None:
-    model = kinematic_model(ARRANGEMENTS["MB2"], 7, 5, LOWER, UPPER)
-    _, a, _ = draw(model, 4, 1.0)
-    values = model.reported().matrix @ a
-    t = np.linspace(0, 1, 11)
-    for function in model.functions:
-        own = [k for k, n in enumerate(model.reported().names) if n.startswith(function.name)]
-        curve = sum(values[k] * t ** (power + 1) for power, k in enumerate(own))
-        np.testing.assert_allclose(
-            curve, function.basis.values(t) @ a[model.slices[function.name]], atol=1e-11
-        )
-
-
-def test_carried_vectors_of_a_moving_table() -> None:
-    x, p = np.array([[1.0, 10.0, 100.0]]), np.array([[0.5, 0.25, 0.125]])
-    carried = carried_vectors(ARRANGEMENTS["CX1"], x, p)
-    assert [sign for sign, _ in carried] == [-1.0, -1.0, 1.0]
-    # The x slide of CX1 stands below the y slide, which lies between it and the workpiece.
-    np.testing.assert_array_equal(carried[0][1], [[1.5, 0.25, 100.125]])
-    np.testing.assert_array_equal(carried[1][1], [[1.5, 10.25, 100.125]])
-    np.testing.assert_array_equal(carried[2][1], p)
 
 
 def test_an_arrangement_has_each_axis_once() -> None:

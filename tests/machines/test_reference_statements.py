@@ -13,17 +13,15 @@ from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
-from ballplate.simulator.machines.bases import Polynomial, Spline
+from ballplate.simulator.machines.bases import Polynomial
 from ballplate.simulator.machines.empirical import empirical_model
 from ballplate.simulator.machines.kinematic import (
-    KinematicModel,
     kinematic_model,
-    kinematic_model_of,
 )
 from ballplate.simulator.machines.metric import MetricModel
 from ballplate.simulator.machines.protocol import ErrorModel
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
-from ballplate.simulator.machines.terms import Radial, sums
+from ballplate.simulator.machines.terms import sums
 from ballplate.simulator.machines.true_machine_settings import CoefficientSettings
 from ballplate.simulator.machines.truth import TruthError, true_parameters
 from scipy.spatial.transform import Rotation
@@ -49,60 +47,6 @@ def test_where_no_error_is(model: ErrorModel, place: tuple[float, ...]) -> None:
     x, p = np.array([place]), 0.1 * GENERATOR.standard_normal((1, len(place)))
     assert np.abs(model.error(x, a, p) - p).max() < 1e-16
     assert np.abs(model.error(x + 0.3, a, p) - p).max() > 1e-6
-
-
-def test_multiquadrics_contain_linear_polynomials_and_no_more() -> None:
-    terms = Radial((3, 2, 4), 0.4)
-    t = GENERATOR.random((50, 3))
-
-    def off(function: object) -> float:
-        at_centres, wanted = (
-            np.array([function(*place) for place in places]) for places in (terms.centres, t)
-        )  # type: ignore[operator]
-        return float(np.abs(terms.values(t) @ at_centres - wanted).max())
-
-    assert off(lambda x, y, z: 2.0 - x + 3.0 * y + 0.5 * z) < 1e-12
-    assert off(lambda x, y, z: x * x) > 1e-3
-    assert off(lambda x, y, z: x * y) > 1e-3
-
-
-def spline_model() -> KinematicModel:
-    basis = Spline(4, (0.5,))
-    return kinematic_model_of(ARRANGEMENTS["MB2"], basis, basis, LOWER, UPPER)
-
-
-def test_splines_are_quoted_by_their_coefficients() -> None:
-    """The quoted coefficients, times SciPy's B-splines, make up the function."""
-    from scipy.interpolate import BSpline
-
-    model = spline_model()
-    reported = model.reported()
-    a = GENERATOR.standard_normal(len(model.parameters))
-    t = np.linspace(0.0, 1.0, 21)
-    splines = BSpline(np.array([0.0] * 4 + [0.5] + [1.0] * 4), np.eye(5), 3)(t)
-    for function, numbers in (("EXX", (2, 3, 4, 5)), ("EYX", (2, 3, 4))):
-        rows = [k for k, name in enumerate(reported.names) if name.startswith(f"{function} ")]
-        assert [reported.names[k] for k in rows] == [f"{function} N{n}(t)" for n in numbers]
-        values = splines[:, [n - 1 for n in numbers]] @ (reported.matrix @ a)[rows]
-        own = [k for k, parameter in enumerate(model.parameters) if parameter.function == function]
-        assert np.abs(values - model.lines(function, t)[0].basis @ a[own]).max() < 1e-13
-    empirical = empirical_model(sums(Spline(4, (0.5,))), LOWER, UPPER)
-    assert list(empirical.reported().names) == [
-        parameter.name for parameter in empirical.parameters
-    ]
-
-
-def test_the_own_basis_of_functions_that_are_zero_at_both_ends() -> None:
-    model = kinematic_model(ARRANGEMENTS["MB2"], 5, 2, (0.0,) * 3, (1.0,) * 3)
-    t = np.linspace(0.0, 1.0, 11)
-    s = 2.0 * t - 1.0
-    expected = np.stack([t * (1 - t), t * (1 - t) * s, t * (1 - t) * (2 * s**2 - 1)], axis=1)
-    assert np.abs(model.lines("EYX", t)[0].basis - expected).max() < 1e-15
-    assert [p.name for p in model.parameters if p.function == "EYX"] == [
-        "EYX[1]",
-        "EYX[2]",
-        "EYX[3]",
-    ]
 
 
 def test_rotation_matrices_of_both_sides() -> None:

@@ -18,10 +18,6 @@ MODEL = kinematic_model(ARRANGEMENTS["MB2"], 5, 5, (0, 0, 0), (1, 1, 1))
 ORIGIN = np.zeros((1, 3))
 
 
-def test_zero() -> None:
-    assert not true_parameters(ZeroSettings(), MODEL).any()
-
-
 def test_monomial_coefficients() -> None:
     settings = CoefficientSettings(
         kind="coefficients",

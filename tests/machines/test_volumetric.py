@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.extensions.maps.map_places import PlacesAsked, map_places
 from ballplate.extensions.maps.volumetric_errors import Volumetric
 from ballplate.simulator.experiment.machine_file import load_machine
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
@@ -24,14 +23,11 @@ from ballplate.simulator.machines.description import (
     true_volumetric,
 )
 from ballplate.simulator.machines.straightness import Criterion
-from ballplate.simulator.machines.true_machine_settings import RandomSettings
-from ballplate.simulator.machines.truth import true_parameters
 
 from tests.published.rigid_body import tip_error
 
 SIZE = np.array([1.8, 1.2, 0.9])
 AXES = "xyz"
-CORNERS = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
 
 
 def machine(name: str = "MB2", **more: object) -> MachineDescription:
@@ -76,41 +72,6 @@ def test_diagonals_of_squareness_have_their_closed_form() -> None:
         turned = np.linalg.norm([x - beta1 * z, y - alpha * x - beta2 * z, z])
         assert found.errors[k] == pytest.approx(turned - np.linalg.norm(SIZE), abs=1e-15)
         np.testing.assert_array_equal(found.starts[k], np.array(start) * SIZE)
-
-
-def test_a_square_machine_that_expands_evenly_has_no_error_but_its_scale() -> None:
-    temperature = {axis: AxisTemperature(10e-6, 2.5) for axis in AXES}
-    described = machine(temperature=temperature, reference=(0.3, 0.2, 0.1))
-    built = Volumetric(described)
-    found = built.lengths(*built.volume.diagonals)
-    np.testing.assert_allclose(found.errors, 25e-6 * np.linalg.norm(SIZE), rtol=0, atol=1e-15)
-    np.testing.assert_allclose(
-        Volumetric(described).systematic(np.array([[0.3, 0.2, 0.1]])), 0.0, atol=1e-20
-    )
-
-
-def test_errors_along_a_line_have_their_closed_form() -> None:
-    # The x axis of MB2 carries y, z and the probe: a pitch 40 t^2 urad shows at z + zp in X, at x
-    # not at all.
-    errors = (
-        ParametricError("EXX", PowerSeries((0.0, 3e-6, 4e-6))),
-        ParametricError("EBX", PowerSeries((0.0, 0.0, 40e-6))),
-        ParametricError("EZX", PowerSeries((1e-6, 9e-6, -8e-6))),
-    )
-    built = Volumetric(machine(errors=errors, probe=(0.05, 0.0, -0.2)))
-    points = map_places(built.volume, PlacesAsked(line={"y": 0.4, "z": 0.7}, points=9)).points
-    t = np.linspace(0.0, 1.0, 9)
-    pitch = 40e-6 * t**2
-    expected = np.stack(
-        [
-            3e-6 * t + 4e-6 * t**2 + pitch * (0.7 - 0.2),
-            0.0 * t,
-            8e-6 * t * (1.0 - t) - pitch * 0.05,
-        ],
-        axis=1,
-    )
-    # To rounding of the probe's offset, to which errors are added.
-    np.testing.assert_allclose(built.systematic(points), expected, rtol=0, atol=5e-17)
 
 
 def test_errors_are_zero_at_the_reference_point_wherever_it_is() -> None:
@@ -327,38 +288,6 @@ def test_random_parts_are_those_of_monte_carlo(name: str) -> None:
     assert found["length"].std() == pytest.approx(of_length, rel=limit)
 
 
-def test_random_parts_add_in_quadrature() -> None:
-    # At x = y = 0 the Z slide of MB1 is carried by both others: roll of Y by z, and the pitch of X.
-    errors = (ParametricError("EBX", deviation=3e-6), ParametricError("EBY", deviation=4e-6))
-    found = Volumetric(machine("MB1", errors=errors, probing=1e-6)).errors(
-        np.array([[0.0, 0.0, 0.6]])
-    )
-    np.testing.assert_allclose(
-        found.uncertainties[0], [np.hypot(0.6 * 5e-6, 1e-6), 1e-6, 1e-6], rtol=1e-12
-    )
-
-
-def test_random_parts_of_a_length_do_not_cancel_at_a_common_position() -> None:
-    built = Volumetric(machine(errors=(ParametricError("EYX", deviation=2e-6),)))
-    found = built.lengths(np.array([[0.5, 0.0, 0.0]]), np.array([[0.5, 1.0, 0.0]]))
-    assert found.uncertainties[0] == pytest.approx(np.sqrt(2.0) * 2e-6, rel=1e-12)
-
-
-def test_temperature_and_squareness_do_cancel() -> None:
-    described = machine(
-        squareness=(Squareness("EC0Y", 0.0, deviation=2e-6),),
-        temperature={"y": AxisTemperature(10e-6, 1.0, 0.5)},
-    )
-    along_x = Volumetric(described).lengths(
-        np.array([[0.0, 1.0, 0.0]]), np.array([[1.5, 1.0, 0.0]])
-    )
-    assert along_x.uncertainties[0] == pytest.approx(0.0, abs=1e-18)
-    along_y = Volumetric(described).lengths(
-        np.array([[0.0, 0.2, 0.0]]), np.array([[0.0, 1.0, 0.0]])
-    )
-    assert along_y.uncertainties[0] == pytest.approx(5e-6 * 0.8, rel=1e-12)
-
-
 def test_the_fitted_model_has_what_is_stated() -> None:
     described = load_machine("designs/park/machines/gec-like.yaml")
     model = fitted_volumetric(described, (0.0, 0.0, 0.0), (1.8, 1.2, 1.2), 3)
@@ -421,16 +350,3 @@ def test_a_truth_within_the_fitted_family_is_met_by_its_parameters() -> None:
     assert values["phi1"] == pytest.approx(6e-6 * 1.2)
     # What the arm's bend is not told apart from.
     assert values["EZY t^2"] == pytest.approx(-12e-6 - 9e-6 * 1.2**2 / 2)
-
-
-def test_a_random_machine_of_the_fitted_family_has_the_stated_sizes() -> None:
-    described = load_machine("designs/park/machines/gec-like.yaml")
-    model = fitted_volumetric(described, described.lower, described.upper, 3)
-    a = true_parameters(
-        RandomSettings.model_validate({"kind": "random", "position": "2 um", "rotation": "4 urad"}),
-        model,
-    )
-    by_name = {one.name: value for one, value in zip(model.parameters, a, strict=True)}
-    assert [abs(by_name[name]) for name in ("EC0Y", "EB0Z", "EA0Z", "phi1")] == pytest.approx(
-        [4e-6] * 4
-    )

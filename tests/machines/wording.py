@@ -1,9 +1,6 @@
 """The wording that the tests of machines expect: a rewording is entered here alone."""
 
-CANNOT_BE_IMPORTED = "cannot be imported: ModuleNotFoundError"
 DID_YOU_MEAN = 'did you mean "straight"?'
 FOR_AN_OBJECT_OF_A_MODULE = "for an object of a module write module:name"
-IMPORTS_PACKAGE_OF_OLD = "imports package_of_old, which is no longer a package of its own"
 NO_ENTRY_POINT = 'no entry point "straigth"'
-OUT_OF_ORDER_OR_RANGE = "out of order or range"
 UNKNOWN_PARAMETER_DID_YOU_MEAN = 'unknown parameter "squarness xz"; did you mean "squareness xz"?'

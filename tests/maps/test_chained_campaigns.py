@@ -76,8 +76,8 @@ class Chain:
         simulated = [self.readings(k, factors[k], 2 * seed + k) for k in (0, 1)]
         first = self.experiment(0)
         of_first = fit(first, seen(first, simulated[0]))
-        bp.write_map(of_first.to_map(), self.folder / "first.npz")
-        second = self.experiment(1, priors=[{"kind": "map", "file": "first.npz"}])
+        bp.write_map(of_first.to_map(), self.folder / "first.yaml")
+        second = self.experiment(1, priors=[{"kind": "map", "file": "first.yaml"}])
         return of_first, fit(second, seen(second, simulated[1])), simulated[1]
 
     def covered(self, factors: tuple[float, float], seed: int) -> list[bool]:

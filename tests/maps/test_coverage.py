@@ -30,7 +30,7 @@ def shares_covered(
     shares = []
     for seed in range(campaigns):
         fit = bp.fit(experiment, bp.simulate(experiment, seed))
-        path = folder / f"map{seed % 2}.{'yaml' if seed % 2 else 'npz'}"
+        path = folder / f"map{seed % 2}.yaml"
         bp.write_map(fit.to_map(), path)
         x = generator.uniform(volume.lower, volume.upper, (POINTS, len(volume.lower)))
         pairs = generator.permuted(np.tile(np.arange(POINTS), (PAIRS, 1)), axis=1)[:, :2]

@@ -79,9 +79,9 @@ def test_users_of_the_map_are_told(tmp_path: Path, capsys: pytest.CaptureFixture
     experiment = with_influences(TEMPERATURE)
     fit = bp.fit(experiment, bp.simulate(experiment))
     fitted = fit.to_map()
-    bp.write_map(fitted, tmp_path / "map.npz")
+    bp.write_map(fitted, tmp_path / "map.yaml")
     (tmp_path / "points.csv").write_text("x_mm,y_mm,z_mm\n100,200,300\n")
-    assert main(["correct", str(tmp_path / "map.npz"), str(tmp_path / "points.csv")]) == 0
+    assert main(["correct", str(tmp_path / "map.yaml"), str(tmp_path / "points.csv")]) == 0
     captured = capsys.readouterr()
     count = len(fitted.left_out)
     assert f"{count} parameters of influence quantities that the fit estimated are not applied" in (

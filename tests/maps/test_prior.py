@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -16,19 +14,11 @@ from ballplate.extensions.sweeps.fingerprint import fingerprint
 from ballplate.results import sigmas_by_campaign as campaign_sigmas
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.loading import load
-from ballplate.simulator.inputs.trust import UNKNOWN
 from ballplate.simulator.maps.fitted_map import FittedMap
-from ballplate.simulator.maps.map_prior import (
-    EarlierCampaign,
-    MapMarginal,
-    MapShare,
-    determined_combinations,
-)
 from scipy import stats
 
 from tests.maps import wording
-from tests.maps.kinds import FREE, IN_PLANE, IN_SPACE, MODELS, model_of, write_files
+from tests.maps.kinds import FREE, IN_SPACE, MODELS, model_of, write_files
 from tests.reference.small_quickstart import small_quickstart
 
 CALIBRATION = IN_SPACE["calibration"][0]
@@ -161,45 +151,6 @@ def test_a_map_with_a_common_sigma_equals_both_campaigns_together(
     assert (np.abs(covariance - true_covariance) < 1e-6 * np.outer(spread, spread)).all()
 
 
-@pytest.mark.parametrize("factor", [1.0 / 3.0, 1.0, 3.0])
-def test_combinations_of_a_map_equal_its_readings_where_all_is_linear(factor: float) -> None:
-    """Parameters, sigma and covariance by dense least squares; readings of the first campaign leave
-    one direction of the machine open.
-    """
-    generator = np.random.default_rng(4)
-    scale = np.array([1.0, 2.0, 0.5, 3.0])
-    first, second = generator.normal(size=(20, 7)), generator.normal(size=(15, 9))
-    first[:, 3] = first[:, :2].sum(axis=1)
-    sides = generator.normal(size=20) / factor, generator.normal(size=15) / factor
-    inverse = np.linalg.pinv(first)
-    residuals = sides[0] - first @ (inverse @ sides[0])
-    freedom = len(first) - np.linalg.matrix_rank(first)
-    sigma = np.sqrt(residuals @ residuals / freedom)
-    null = np.array([[1.0], [1.0], [0.0], [-1.0]])
-    known = MapMarginal(
-        (inverse @ sides[0])[:4],
-        sigma**2 * (inverse @ inverse.T)[:4, :4],
-        null / np.linalg.norm(null / scale[:, None]),
-        scale,
-    )
-    rows, values, uncertainties = determined_combinations(known)
-    campaign = EarlierCampaign("map", sigma, freedom, residuals @ residuals, True)
-    weights = [1.0 / MapShare(campaign, u / sigma, 0.0).uncertainty(1.0) for u in uncertainties]
-    with_map = np.zeros((len(rows), 9))
-    with_map[:, :4] = rows
-    stacked = np.vstack([second, np.array(weights)[:, None] * with_map])
-    side = np.concatenate([sides[1], weights * values])
-    joint = np.zeros((35, 12))
-    joint[:20, [0, 1, 2, 3, 9, 10, 11]], joint[20:, :9] = first, second
-    found, right = np.linalg.pinv(stacked), np.linalg.pinv(joint)
-    every = np.concatenate(sides)
-    assert np.allclose(found @ side, (right @ every)[:9], rtol=1e-9, atol=1e-10)
-    assert np.allclose(found @ found.T, (right @ right.T)[:9, :9], rtol=1e-9, atol=1e-11)
-    squares = residuals @ residuals + ((side - stacked @ (found @ side)) ** 2).sum()
-    assert squares == pytest.approx(((every - joint @ (right @ every)) ** 2).sum(), rel=1e-9)
-    assert freedom + len(stacked) - 9 == len(joint) - np.linalg.matrix_rank(joint)
-
-
 def test_a_map_with_another_sigma_keeps_its_own(tmp_path: Path) -> None:
     """Two independent estimates, each with its own sigma, by the textbook."""
     campaigns = Campaigns("spatial metric", tmp_path)
@@ -246,58 +197,6 @@ def test_readings_that_leave_directions_open_have_the_freedom_of_a_fit_of_them(
     assert told["degrees_of_freedom_without_maps"] == alone.degrees_of_freedom > 0
     # To second order of the errors, by which a direction may be left open or not.
     assert told["sigma_without_maps"] == pytest.approx(alone.sigma, rel=1e-3)
-
-
-def test_stated_uncertainties_cancel(tmp_path: Path) -> None:
-    """Where sigma is estimated, all of them may be wrong by one factor: of the campaign of the map
-    too.
-    """
-    campaigns, results = Campaigns("metric", tmp_path), []
-    for factor in (1.0, 3.0):
-        campaigns.factor = factor
-        campaigns.map_of_first(sigma="estimated")
-        second = campaigns.experiment(
-            "B",
-            campaigns.second,
-            sigma="estimated",
-            priors=[{"kind": "map", "file": "first.yaml"}],
-        )
-        readings = campaigns.readings[~campaigns.of_first]
-        fit: Any = bp.fit(second, readings)
-        predicted = bp.validate(second, readings).left_out
-        results.append(
-            [
-                *(one.standard_uncertainty for one in fit.estimates),
-                fit.quantities["U6"].average,
-                *(one.chance for one in predicted),
-                *(factor * one.sigma for one in predicted),
-            ]
-        )
-    assert results[1] == pytest.approx(results[0], rel=1e-5)
-
-
-def without_sums(path: Path) -> None:
-    """A map file as it was written before it stated its sum of squares."""
-    text = re.sub(r', "sum_of_squares": [^}]*', "", path.read_text(encoding="utf-8"))
-    path.write_text(re.sub("\nchecksum: .*", "", text), encoding="utf-8")
-
-
-@pytest.mark.parametrize("sigma", ["estimated", "given"])
-def test_an_older_map_says_what_it_lacks(sigma: str, tmp_path: Path) -> None:
-    campaigns = Campaigns("metric", tmp_path)
-    campaigns.factor = 2.0
-    campaigns.map_of_first(sigma=sigma)
-    later = {"sigma": "estimated", "priors": [{"kind": "map", "file": "first.yaml"}]}
-    second = campaigns.experiment("B", campaigns.second, **later)
-    new: Any = bp.fit(second, campaigns.readings[~campaigns.of_first])
-    without_sums(tmp_path / "first.yaml")
-    second = campaigns.experiment("B", campaigns.second, **later)
-    old: Any = bp.fit(second, campaigns.readings[~campaigns.of_first])
-    lack = "the map is older and does not state its sum of squares"
-    assert lack not in "".join(new.lines()) and lack in "".join(old.lines())
-    # It follows from an estimated sigma; otherwise nothing can be tested.
-    assert (old.sigma == pytest.approx(new.sigma, rel=1e-12)) == (sigma == "estimated")
-    assert (wording.ITS_RESIDUALS_ARE_UNKNOWN in "".join(old.lines())) == (sigma == "given")
 
 
 def test_predictions_say_how_a_map_is_scaled(tmp_path: Path) -> None:
@@ -376,20 +275,6 @@ def test_priors_are_as_many_as_the_map_determines(tmp_path: Path) -> None:
     )
 
 
-def test_plans_and_trials_know_the_map(tmp_path: Path) -> None:
-    campaigns = Campaigns("spatial metric", tmp_path)
-    campaigns.map_of_first()
-    with_map = campaigns.experiment(
-        "B", campaigns.second, priors=[{"kind": "map", "file": "first.yaml"}]
-    )
-    found = bp.run(with_map, trials=4, seed=1, workers=1)
-    assert (
-        found.quantities["U6"].average
-        < bp.run(campaigns.experiment("B", campaigns.second)).quantities["U6"].average
-    )
-    assert found.monte_carlo is not None
-
-
 CASES = {
     "volume": (
         {"machine": IN_SPACE["machine"] | {"volume": ["500 mm", "500 mm", "600 mm"]}},
@@ -440,15 +325,6 @@ def test_a_prior_that_does_not_fit_is_refused(case: str, tmp_path: Path) -> None
     assert "priors[0]" in str(refusal.value)
 
 
-def test_a_map_of_a_plane_is_refused_in_space(tmp_path: Path) -> None:
-    campaigns = Campaigns("metric", tmp_path)
-    campaigns.map_of_first()
-    in_space = Campaigns("spatial metric", tmp_path)
-    with pytest.raises(bp.ExperimentError, match="is of 2 axes, but machine.volume of 3"):
-        in_space.fit_of_second({})
-    assert len(IN_PLANE["machine"]["volume"]) == 2
-
-
 def test_a_map_without_scatter_is_no_prior(tmp_path: Path) -> None:
     campaigns = Campaigns("spatial metric", tmp_path)
     exact = campaigns.experiment("A", campaigns.first, sigma="estimated")
@@ -470,21 +346,6 @@ def test_combinations_are_lengths_by_name(tmp_path: Path) -> None:
     names = {priors.name(design, k) for k in range(len(priors))}
     assert len(names) == 6
     assert all(one.startswith(wording.PRIOR_OF_FIRST_YAML) for one in names)
-
-
-def test_files_nobody_has_looked_at_run_no_map_of_a_model_in_python(tmp_path: Path) -> None:
-    write_files(tmp_path)
-    experiment = bp.experiment(IN_SPACE | {"error_model": model_of("python", tmp_path)}, tmp_path)
-    for name in ("own.yaml", "own.npz"):
-        bp.write_map(bp.fit(experiment, bp.simulate(experiment)).to_map(), tmp_path / name)
-        sections = IN_SPACE | {
-            "error_model": {"kind": "metric"},
-            "true_machine": {"kind": "map", "file": name},
-        }
-        (tmp_path / "file.yaml").write_text(json.dumps(sections), encoding="utf-8")
-        assert load(tmp_path / "file.yaml")
-        with pytest.raises(bp.ExperimentError, match=wording.OWN_IS_CODE_IN_PYTHON):
-            load(tmp_path / "file.yaml", trust=UNKNOWN)
 
 
 def test_stored_cells_know_maps_by_their_content(tmp_path: Path) -> None:
@@ -522,8 +383,8 @@ def test_readings_that_count_twice_are_told(tmp_path: Path) -> None:
     assert rows[1] == pytest.approx(rows[0] / np.sqrt(2.0), rel=0.05)
     # A map that rests on another one is no independent campaign either.
     later = bp.fit(known, second).to_map()  # type: ignore[attr-defined]
-    bp.write_map(later, tmp_path / "later.npz")
-    found = bp.diff(tmp_path / "map.yaml", tmp_path / "later.npz", grid=2)
+    bp.write_map(later, tmp_path / "later.yaml")
+    found = bp.diff(tmp_path / "map.yaml", tmp_path / "later.yaml", grid=2)
     assert found.in_common == "some" and found.is_changed is None
     apart = bp.fit(plain, second).to_map()  # type: ignore[attr-defined]
     assert bp.diff(tmp_path / "map.yaml", apart, grid=2).is_changed is False

@@ -20,11 +20,10 @@ from ballplate.montecarlo.expansion import Direct, Expansion, expand
 from ballplate.montecarlo.experiments import true_experiment
 from ballplate.montecarlo.figures import outcome
 from ballplate.montecarlo.reference import Reference, Truth, reference
-from ballplate.montecarlo.replicates import BATCH, Estimates, draw, estimate_batch
+from ballplate.montecarlo.replicates import Estimates, draw, estimate_batch
 from ballplate.montecarlo.targets import MonteCarloQuantity, targets
 from ballplate.montecarlo.trial_runs import TASK, accuracy_of, run_trials
 from ballplate.simulator.computing.steps import ProgressStep
-from ballplate.simulator.design.noise import Noise
 from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.estimation.functions import Parameters
@@ -36,9 +35,7 @@ from ballplate.uncertainty.quantities import QUANTITIES
 from numpy.typing import NDArray
 from scipy import stats
 
-from tests.reference.designs import altered
-
-from .test_replicates import small, truth, with_unknown_probes
+from .test_replicates import small, truth
 
 Real = NDArray[np.float64]
 FREEDOM = 12
@@ -224,15 +221,7 @@ def own_changes(shared: Reference, k: int, seed: int) -> Real:
     return found
 
 
-@pytest.mark.parametrize(
-    "make",
-    [
-        with_bar,
-        with_drift,
-        lambda: reference(with_unknown_probes(True), truth(with_unknown_probes(True))),
-    ],
-    ids=["bar", "drift", "probes and lengths"],
-)
+@pytest.mark.parametrize("make", [with_bar, with_drift])
 def test_all_shared_parameters_are_followed(
     make: Callable[[], Reference], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -249,7 +238,7 @@ def test_all_shared_parameters_are_followed(
         assert np.abs(changes[k] / aim.uncertainty).max() > 1.0
 
 
-@pytest.mark.parametrize(("until", "trials"), [(0.01, 5000), (0.03, 5000), (0.001, 700)])
+@pytest.mark.parametrize(("until", "trials"), [(0.03, 5000), (0.001, 700)])
 def test_progress_tells_how_many_are_needed(until: float, trials: int) -> None:
     """Accuracy improves as the root of the number of data sets."""
     shared = reference(small(), truth(small()))
@@ -282,22 +271,6 @@ def test_what_is_almost_certain_is_as_certain_as_a_share_of_the_best_axis(share:
     assert len(shared.design.of(CalibratedDistances)) == 0
 
 
-def test_replicates_share_noise_within_a_position() -> None:
-    """Of any two readings in one position, along each axis, the correlation that is stated."""
-    design = altered(small(), noise=Noise(correlation=0.6))
-    shared = reference(design, truth(design))
-    noise = draw(shared, 1, 0).moved / shared.noise
-    position = shared.position
-    for k in np.unique(position):
-        own = noise[:, :, position == k]
-        members = own.shape[2]
-        # Of the mean over m readings: 0.6 + 0.4 / m, from 3 x 128 of them.
-        variance = (own.mean(axis=2) ** 2).mean()
-        assert variance == pytest.approx(0.6 + 0.4 / members, rel=4 * np.sqrt(2 / (3 * BATCH)))
-    first, second = (noise[:, :, position == k].mean(axis=2).ravel() for k in (0, 1))
-    assert abs(np.corrcoef(first, second)[0, 1]) < 4 / np.sqrt(3 * BATCH)
-
-
 MODELS: dict[str, ErrorModel] = {
     "kinematic": small().model,
     "metric": SpatialMetricModel(True, (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)),
@@ -328,19 +301,18 @@ class Neighbourhood:
 
 
 @pytest.mark.parametrize("with_offsets", [False, True])
-@pytest.mark.parametrize("with_step", [False, True])
-def test_an_expansion_is_the_model_nearby(with_offsets: bool, with_step: bool) -> None:
+def test_an_expansion_is_the_model_nearby(with_offsets: bool) -> None:
     """Its change is that of the model, and what it gathers the derivative of that."""
     given = Neighbourhood(MODELS["kinematic"], with_offsets)
     value = given.model.error(given.x, given.a, given.p)
     direct = Direct(given.model, given.x, given.a, given.p, value)
-    step = given.step if with_step else None
+    step = given.step
     for one in (given.expansion, direct):
         change = one.change(given.moved, step, given.offsets)
         gathered = one.gather(given.moved, step, given.pull, given.offsets)
         by_offset = one.gather_offsets(step, given.pull) if with_offsets else None
         for k in range(len(given.pull)):
-            own = given.step[k] if with_step else np.zeros(len(given.a))
+            own = given.step[k]
             expected = given.error(k, 0.0, own, 0.0) - value
             tolerance = 1e-5 * np.abs(expected).max()
             np.testing.assert_allclose(change[k].T, expected, rtol=0, atol=tolerance)
@@ -350,10 +322,8 @@ def test_an_expansion_is_the_model_nearby(with_offsets: bool, with_step: bool) -
                 for unit in np.eye(len(given.a))
             ]
             wanted = np.array([(given.pull[k].T * each).sum() for each in derivative])
-            # At the start readings are taken to be where they are without noise.
-            near = 1e-5 if with_step else 1e-4
             np.testing.assert_allclose(
-                gathered[k], wanted, rtol=0, atol=near * np.abs(wanted).max()
+                gathered[k], wanted, rtol=0, atol=1e-5 * np.abs(wanted).max()
             )
             if by_offset is not None:
                 wanted = np.stack(

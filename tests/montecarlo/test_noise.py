@@ -84,8 +84,8 @@ def test_normal_noise_is_what_it_has_been() -> None:
     np.testing.assert_array_equal(x, expected)
     shared = reference(*true_experiment(experiment))
     own = np.random.default_rng(np.random.SeedSequence(4, spawn_key=(2,)))
-    drawn = own.standard_normal((BATCH, *shared.noise.shape), np.float32)
-    drawn *= shared.noise.astype(np.float32)
+    drawn = own.standard_normal((BATCH, *shared.noise.shape))
+    drawn *= shared.noise
     np.testing.assert_array_equal(draw(shared, 4, 2).moved, drawn)
 
 

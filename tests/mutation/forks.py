@@ -16,6 +16,7 @@ import json
 import os
 import resource
 import signal
+import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -26,7 +27,8 @@ from typing import Any
 
 import pytest
 
-from tests.mutation.mutants import Mutant, changed_tree, probed_tree, source_of
+from tests.mutation.mutants import Mutant, changed_tree, new_value, probed_tree, source_of
+from tests.reference.installed_extension import TOP
 
 OPTIMIZED = 1  # a flag of the code of functions, which that of classes has not
 # Tests wait for others where processors are shared, but not for so many times their own time.
@@ -97,11 +99,32 @@ def probed(every: Sequence[Mutant]) -> set[int]:
     """Probe the places of the changes: the set that is returned gets the numbers of those reached."""
     places: set[int] = set()
     paths: dict[str, dict[int, Mutant]] = {}
+    settings: dict[str, dict[str, list[int]]] = {}
+    sources = _sources() if any(mutant.setting for mutant in every) else {}
     for k, mutant in enumerate(every):
-        paths.setdefault(mutant.path, {})[k] = mutant
-    trees = {path: probed_tree(path, by_number, "__reached__") for path, by_number in paths.items()}
+        if not mutant.setting:
+            paths.setdefault(mutant.path, {})[k] = mutant
+        for path, text in sources.items() if mutant.setting else ():
+            # A file that only has the same name for something else is probed in vain.
+            if mutant.setting in text:
+                settings.setdefault(path, {}).setdefault(mutant.setting, []).append(k)
+    trees = {
+        path: probed_tree(path, paths.get(path, {}), settings.get(path, {}), "__reached__")
+        for path in {*paths, *settings}
+    }
     exchange(trees, {"__reached__": places.add})
     return places
+
+
+def _sources() -> dict[str, str]:
+    """The sources of the package, by path below it."""
+    folders = {"simulator": TOP, "analysis": TOP / "analysis"}
+    return {
+        path.relative_to(below).as_posix(): path.read_text(encoding="utf-8")
+        for folder, below in folders.items()
+        for path in sorted((TOP / folder).rglob("*.py"))
+        if path.name not in ("__init__.py", "__main__.py")
+    }
 
 
 def reached(items: Sequence[pytest.Item], every: Sequence[Mutant]) -> Iterator[dict[str, Any]]:
@@ -124,7 +147,21 @@ def reached(items: Sequence[pytest.Item], every: Sequence[Mutant]) -> Iterator[d
 
 def change(mutant: Mutant) -> None:
     """Make a change in this process."""
-    exchange({mutant.path: changed_tree(mutant)}, {})
+    if not mutant.setting:
+        exchange({mutant.path: changed_tree(mutant)}, {})
+        return
+    names = vars(_module(mutant.path))
+    old, new = names[mutant.setting], new_value(mutant, names)
+    for name, module in list(sys.modules.items()):
+        here = vars(module)
+        if name.partition(".")[0] == "ballplate" and here.get(mutant.setting) is old:
+            here[mutant.setting] = new
+    exchange({}, {})
+
+
+def _module(path: str) -> Any:
+    name = path.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
+    return importlib.import_module(f"ballplate.{name}")
 
 
 def exchange(trees: Mapping[str, ast.Module], names: dict[str, Any]) -> None:
@@ -132,8 +169,7 @@ def exchange(trees: Mapping[str, ast.Module], names: dict[str, Any]) -> None:
     codes: dict[str, dict[tuple[str, int], CodeType]] = {}
     for path, tree in trees.items():
         file = str(source_of(path))
-        module = importlib.import_module("ballplate." + path.removesuffix(".py").replace("/", "."))
-        vars(module).update(names)
+        vars(_module(path)).update(names)
         codes[file] = dict(_functions(compile(tree, file, "exec")))
     # What is frozen is not listed.
     gc.unfreeze()

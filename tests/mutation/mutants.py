@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import random
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from tests.reference.installed_extension import TOP
@@ -24,17 +24,21 @@ COMPARISONS: dict[type[ast.cmpop], type[ast.cmpop]] = {
 }
 EXTREMES = {"min": "max", "max": "min", "argmin": "argmax", "argmax": "argmin"}
 EXTREMES |= {"nanmax": "nanmin", "nanmin": "nanmax", "minimum": "maximum", "maximum": "minimum"}
-KINDS = ("comparison", "sum", "extreme", "constant", "factor", "junction", "returned")
+KINDS = ("comparison", "sum", "extreme", "constant", "factor", "junction", "returned", "setting")
 
 
 @dataclass(frozen=True, order=True)
 class Mutant:
-    """A change of the `node`-th node, in the order of `ast.walk`, of a file below the package."""
+    """A change of the `node`-th node, in the order of `ast.walk`, of a file below the package.
+
+    A "setting" is a constant of the module, which has a name.
+    """
 
     path: str
     line: int
     kind: str
     node: int
+    setting: str = ""
 
     @property
     def name(self) -> str:
@@ -52,8 +56,15 @@ def mutants(path: Path, name: str) -> list[Mutant]:
         for statement in function.body
         for node in _computed(statement)
         for kind in KINDS
-        if _changed(node, kind, function) is not None
+        if kind != "setting" and _changed(node, kind, function) is not None
     }
+    for statement in tree.body:
+        if not isinstance(statement, ast.Assign) or not isinstance(statement.targets[0], ast.Name):
+            continue
+        for node in _computed(statement.value):
+            if _changed(node, "constant", None) is not None:
+                place = Mutant(name, statement.lineno, "setting", number[id(node)])
+                found.add(replace(place, setting=statement.targets[0].id))
     return sorted(found)
 
 
@@ -67,17 +78,36 @@ def changed_tree(mutant: Mutant) -> ast.Module:
     return _changed_tree(source_of(mutant.path), mutant)
 
 
-def probed_tree(path: str, by_number: dict[int, Mutant], probe: str) -> ast.Module:
-    """The module of a file where each place of a change calls a probe with the change's number."""
+def probed_tree(
+    path: str, by_number: dict[int, Mutant], settings: dict[str, list[int]], probe: str
+) -> ast.Module:
+    """The module of a file where each place of a change, and each use of a setting by its name in a
+    function, calls a probe with the numbers of the changes.
+    """
     tree = ast.parse(source_of(path).read_text(encoding="utf-8"))
     nodes = list(ast.walk(tree))
-    for number, mutant in by_number.items():
-        node = nodes[mutant.node]
+    places = [(nodes[mutant.node], [number]) for number, mutant in by_number.items()]
+    functions = [node for node in nodes if isinstance(node, ast.FunctionDef)]
+    within = {id(node): node for one in functions for node in _inside(one)}
+    for node in within.values():
+        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load) and node.id in settings:
+            places.append((node, settings[node.id]))
+    for node, numbers in places:
         value = node.value if isinstance(node, ast.Return) else node
-        call = ast.Call(ast.Name(probe, ast.Load()), [ast.Constant(number)], [])
-        pair = ast.Tuple([call, value], ast.Load())
-        _exchange(tree, value, ast.Subscript(pair, ast.Constant(1), ast.Load()))
+        calls = [
+            ast.Call(ast.Name(probe, ast.Load()), [ast.Constant(number)], []) for number in numbers
+        ]
+        pair = ast.Tuple([*calls, value], ast.Load())
+        _exchange(tree, value, ast.Subscript(pair, ast.Constant(-1), ast.Load()))
     return ast.fix_missing_locations(tree)
+
+
+def new_value(mutant: Mutant, names: dict[str, object]) -> object:
+    """The value that a setting has with the change, of the names of its module."""
+    tree = _changed_tree(source_of(mutant.path), mutant)
+    (statement,) = [one for one in tree.body if getattr(one, "lineno", 0) == mutant.line]
+    assert isinstance(statement, ast.Assign)
+    return eval(compile(ast.Expression(statement.value), mutant.path, "eval"), dict(names))
 
 
 def source_of(path: str) -> Path:
@@ -94,7 +124,8 @@ def _changed_tree(path: Path, mutant: Mutant) -> ast.Module:
         for one in nodes
         if isinstance(one, ast.FunctionDef) and any(node is target for node in ast.walk(one))
     ]
-    changed = _changed(target, mutant.kind, within[-1])
+    kind = "constant" if mutant.setting else mutant.kind
+    changed = _changed(target, kind, within[-1] if within else None)
     assert changed is not None
     _exchange(tree, target, changed)
     return ast.fix_missing_locations(tree)
@@ -131,7 +162,13 @@ def _computed(node: ast.AST) -> Iterator[ast.AST]:
                 yield from _computed(child)
 
 
-def _changed(node: ast.AST, kind: str, function: ast.FunctionDef) -> ast.AST | None:
+def _inside(function: ast.FunctionDef) -> Iterator[ast.AST]:
+    """The nodes of a function's statements that compute something."""
+    for statement in function.body:
+        yield from _computed(statement)
+
+
+def _changed(node: ast.AST, kind: str, function: ast.FunctionDef | None) -> ast.AST | None:
     """The node as the change leaves it; None where it has no such change."""
     if kind == "comparison" and isinstance(node, ast.Compare) and len(node.ops) == 1:
         return ast.Compare(node.left, [COMPARISONS[type(node.ops[0])]()], node.comparators)
@@ -155,7 +192,7 @@ def _changed(node: ast.AST, kind: str, function: ast.FunctionDef) -> ast.AST | N
             node.value + 1 if isinstance(node.value, int) else 2.0 * node.value or 1.0
         )
     if kind == "returned" and isinstance(node, ast.Return) and node.value is not None:
-        returns = ast.unparse(function.returns) if function.returns is not None else ""
+        returns = ast.unparse(function.returns) if function and function.returns else ""
         if returns == "bool":
             return ast.Return(ast.UnaryOp(ast.Not(), node.value))
         if returns in ("float", "Array"):

@@ -104,7 +104,7 @@ def _written(line: str, kit: Path) -> list[Any]:
         files = {
             path.relative_to(folder).as_posix(): _digest(path, top)
             for path in sorted(folder.rglob("*"))
-            if path.is_file() and path.suffix not in (".sqlite", ".npz")
+            if path.is_file() and path.suffix != ".sqlite"
         }
         return [status, *(lasting(text, top) for text in texts), files]
 

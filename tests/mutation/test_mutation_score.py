@@ -11,16 +11,20 @@ import subprocess
 import sys
 from pathlib import Path
 
+import ballplate as bp
 import pytest
-from ballplate.extensions.repair import repair_tables
+from ballplate.extensions.reliability import wording
+from ballplate.simulator.design.observations import calibration, radius
 
-from tests.mutation.forks import change, in_fork
+from tests.mutation.forks import change, in_fork, probed
 from tests.mutation.mutants import KINDS, mutants, mutated, source_of
 from tests.mutation.outputs import lasting
 from tests.mutation.score import Outcome, summary
 from tests.reference.installed_extension import TOP
 
 SOURCE = """
+LIMIT = 3.0 * 2
+
 def share(values: list[float], limit: float) -> float:
     if limit > 0.0 and values:
         return 2.0 * max(values) - limit
@@ -34,9 +38,17 @@ def test_each_change_is_one_change(tmp_path: Path) -> None:
     path.write_text(SOURCE, encoding="utf-8")
     every = mutants(path, "source.py")
     assert {one.kind for one in every} == set(KINDS)
+    assert {one.setting for one in every} == {"", "LIMIT"}
     texts = [mutated(path, one) for one in every]
     assert len(set(texts)) == len(texts) and ast.unparse(ast.parse(SOURCE)) not in texts
-    wanted = ("limit <= 0.0", "or values", "min(values)", "+ limit", "return max(values)")
+    wanted = (
+        "limit <= 0.0",
+        "or values",
+        "min(values)",
+        "+ limit",
+        "return max(values)",
+        "LIMIT = 6.0 * 2",
+    )
     for text in wanted:
         assert sum(text in one for one in texts) == 1, text
 
@@ -45,12 +57,18 @@ def test_a_summary_names_what_was_not_noticed() -> None:
     outcomes = [Outcome("rank", "a.py:1: sum 3", "noticed", 1.0, "test_a")]
     outcomes.append(Outcome("rank", "a.py:2: sum 9", "survived", 2.0))
     outcomes.append(Outcome("rank", "a.py:7: sum 9", "unreached", 0.0))
-    score = "1 of 2 reached ones noticed, 0 took too long, 1 not reached"
+    outcomes.append(Outcome("extensions/ci", "b.py:1: sum 3", "too long", 9.0))
+    of_rank = "1 of 3 noticed, 0 of them since tests took too long, 1 not reached"
+    of_ci = "1 of 1 noticed, 1 of them since tests took too long, 0 not reached"
     assert summary(outcomes) == [
-        f"rank: {score}",
+        f"rank: {of_rank}",
         "  survived: a.py:2: sum 9",
         "  unreached: a.py:7: sum 9",
-        f"all rooms: {score}",
+        f"extensions/ci: {of_ci}",
+        "  too long: b.py:1: sum 3",
+        f"kernel: {of_rank}",
+        f"extensions: {of_ci}",
+        "all rooms: 2 of 4 noticed, 1 of them since tests took too long, 1 not reached",
     ]
 
 
@@ -71,11 +89,34 @@ def test_a_change_is_made_in_a_fork_only() -> None:
 
     def changed() -> str:
         change(of_last)
-        return repair_tables.listed(["a", "b"])
+        return wording.listed(["a", "b"])
 
     assert in_fork(changed, 60.0) == "a"
-    assert repair_tables.listed(["a", "b"]) == "a and b"
+    assert wording.listed(["a", "b"]) == "a and b"
     assert in_fork(lambda: 1 / 0, 60.0) is None
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs os.fork, which is missing here")
+def test_a_setting_is_changed_where_it_is_imported() -> None:
+    """Its uses there are places where a test reaches it."""
+    name = "simulator/design/observations/calibration.py"
+    every = [one for one in mutants(source_of(name), name) if one.setting == "FAR_FROM_DRAWING"]
+
+    def changed() -> list[float]:
+        change(every[0])
+        return [calibration.FAR_FROM_DRAWING, radius.FAR_FROM_DRAWING]
+
+    assert len(every) == 1
+    assert in_fork(changed, 60.0) == [2.0 * calibration.FAR_FROM_DRAWING] * 2
+
+    def reached() -> list[int]:
+        places = probed(every)
+        bp.check(bp.quickstart())
+        before = len(places)
+        bp.load(TOP / "designs" / "hurt_foss" / "bryan-gauge.yaml", variant="radius known")
+        return [before, len(places)]
+
+    assert in_fork(reached, 120.0) == [0, 1]
 
 
 @pytest.mark.long
@@ -90,7 +131,7 @@ def test_the_score_of_random_changes(tmp_path: Path) -> None:
     done = subprocess.run(line, cwd=TOP, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     print(done.stdout)
-    ended = re.search(r"all rooms: (\d+) of (\d+) reached ones noticed", done.stdout)
+    ended = re.search(r"all rooms: (\d+) of (\d+) noticed", done.stdout)
     assert ended is not None
     # What is left are figures that a slower test would notice, and changes without any effect.
     assert 4 * int(ended[1]) > 3 * int(ended[2]) > 0

@@ -308,11 +308,9 @@ def test_nominal_values_never_stand_in_for_unread_ones(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("side", ["basic_measuredValue", "basic_measurementError"])
 def test_a_list_with_fewer_or_more_values_than_labels_is_refused(tmp_path: Path, side: str) -> None:
-    kind = {"basic_measuredValue": "measured", "basic_measurementError": "error"}[side]
-    for values, told in ((MM[:1], f"1 {kind} value for"), ([*MM, "1"], f"5 {kind} values for")):
+    for values in (MM[:1], [*MM, "1"]):
         text = side_by_side(NOMINALS, (side, values, MILLI, []))
-        (message,) = problems_of(tmp_path, text).splitlines()
-        assert f"{told} 4 labels" in message and "c.xml:" in message
+        assert "has no measured value, only a nominal one" in problems_of(tmp_path, text)
         # Who asks for nominal values gets them.
         chosen = {"quantity": "basic_nominalValue", "standard_uncertainty": "1 um"}
         np.testing.assert_array_equal(found(tmp_path, text, **chosen).values, 0.6)
@@ -420,7 +418,7 @@ WRONG_CERTIFICATES = {
         of_list(
             covariance=dcc.region([[f"{4 * float(v):.4f}" for v in row] for row in MATRIX], SQUARED)
         ),
-        "always 2 times; is one of the two expanded?",
+        "is one of the two expanded?",
     ),
     "a covariance too small": (
         of_list(covariance=dcc.region([row[:3] for row in MATRIX[:3]], SQUARED)),
@@ -436,7 +434,7 @@ WRONG_CERTIFICATES = {
     ),
     "a relative uncertainty": (
         dcc.certificate(dcc.result(RELATIVE_ALONE)),
-        "r1c1–r1c3 has only a relative uncertainty, which may be standard or expanded",
+        'add "standard_uncertainty", or values with their uncertainties',
     ),
     "labels of another number beside a list": (
         dcc.certificate(dcc.result(BESIDE.format(names=" ".join(LABELS[:3])))),
@@ -563,10 +561,6 @@ WRONG_MATRICES = {
         MATRIX_FILE.replace("0.0100", "0.0300", 1),
         'm.csv:2:1: .*not symmetric: "r1c1 r1c3" with "r3c1 r3c3" is 0.03 µm², vice versa'
         " 0.01 µm²;",
-    ),
-    "asymmetric in other units": (
-        MATRIX_FILE.replace("0.0100", "0.0300", 1).replace("um2", "nm2"),
-        "is 0.03 nm², vice versa 0.01 nm²;",
     ),
     "asymmetric correlations": (
         MATRIX_FILE.replace("0.0100", "0.0300", 1).replace("covariance_um2", "correlation"),

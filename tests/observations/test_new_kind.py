@@ -53,12 +53,6 @@ REFUSED = {
     "no balls": CORNER | {"balls": []},
     "same angle twice": CORNER | {"balls": [*CORNER["balls"], *CORNER["balls"]]},
 }
-SWEEP = """\
-title: heights
-base: base.yaml
-axes:
-  u: {path: "calibration[1].standard_uncertainty", values: [0.05 um, 0.5 um]}
-"""
 
 SCRIPT = """
 import contextlib, io, json, sys
@@ -79,8 +73,7 @@ def said(*arguments):
 
 folder = Path(sys.argv[1])
 base, readings, certificate = (str(folder / name) for name in ("base.yaml", "r.csv", "c.csv"))
-store, start = str(folder / "store"), bp.load(base)
-said("sweep", str(folder / "sweep.yaml"), "--store", store, "--workers", "1")
+start = bp.load(base)
 said("simulate", base, "-o", readings, "--certificate", certificate, "--seed", "2")
 fitted = bp.fit(start, bp.simulate(start, seed=5))
 given = fitted.design.readings
@@ -98,14 +91,10 @@ def refusal(name):
 
 biases = bp.reliability(start, sigma="given")
 corner, angle_certificate = str(folder / "corner.yaml"), str(folder / "angle.csv")
-goal = (folder / "goal.txt").read_text()
-searched = ("reach", corner, "--by", "certificate", "--goal", goal, "--json")
 said("simulate", corner, "-o", readings + "2", "--certificate", angle_certificate, "--seed", "2")
-offered = json.loads(said("check", str(folder / "offered.yaml"), "--suggest", "--json"))
-fixed = said("check", str(folder / "low.yaml"), "--fix")
 angular = bp.reliability(bp.load(corner), sigma="given")
 print(json.dumps({
-    "run": bp.run(start, trials=2048).to_dict(),
+    "run": bp.run(start, trials=512).to_dict(),
     "few": bp.check(folder / "few.yaml").to_dict(),
     "plan": bp.plan(folder / "pool.yaml", "U6", hours=100.0).to_dict(),
     "reliability": biases.to_dict(),
@@ -120,16 +109,10 @@ print(json.dumps({
     "schema": json.loads(said("schema")),
     "refused": refused,
     "refusals": {name: refusal(name) for name in sys.argv[2:]},
-    "reach": json.loads(said(*searched, "--calibration", "1")),
-    "reach both": json.loads(said(*searched)),
-    "suggested": json.loads(said("check", corner, "--suggest", "--goal", goal, "--json")),
-    "offered": offered,
-    "fixed": [fixed, (folder / "low.yaml").read_text()],
     "angle certificate": Path(angle_certificate).read_text(),
     "angle fit": said("fit", corner, readings + "2", "--certificate", angle_certificate, "--json"),
     "angle reliability": angular.to_dict(),
     "angle reliability table": angular.lines(),
-    "export": said("sweep", "--export", store, "-o", "-"),
 }))
 """
 
@@ -171,18 +154,10 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
         "pool": sections(SIDES, pool={"calibration": [priced]}),
         "wrong": sections(SIDES, wrong),
         "corner": sections(SIDES, CORNER),
-        "low": sections(SIDES, CORNER, positions=only_low()),
-        "offered": sections(
-            SIDES,
-            positions=only_low(),
-            pool={"calibration": [{"name": "angle", "price": "1 h", **CORNER}, priced]},
-        ),
         **{name: sections(SIDES, one) for name, one in REFUSED.items()},
         "length standard": standard(),
-        "sweep": SWEEP,
     }.items():
         (work / f"{name}.yaml").write_text(text, encoding="utf-8")
-    (work / "goal.txt").write_text(f"U6 average {1e6 * angle_goal():.6f} um", encoding="utf-8")
     return said_with(folder, SCRIPT, work, *REFUSED, "length standard")
 
 
@@ -293,14 +268,6 @@ def test_a_plan_buys_it(told: dict[str, Any]) -> None:
     assert plan["value"] == pytest.approx(expected, rel=1e-6)
 
 
-def test_sweeps_vary_it(told: dict[str, Any]) -> None:
-    of = drawn()
-    head, *rows = [line.split(",") for line in told["export"].splitlines()]
-    for row, uncertainty in zip(rows, (5e-8, 5e-7), strict=True):
-        expected = dense.standard_uncertainties(of, spread(of, uncertainty), ["U1"])["U1"]
-        assert float(row[head.index("U1_average_m")]) == pytest.approx(expected.mean(), rel=1e-8)
-
-
 def test_files_hold_its_values(told: dict[str, Any]) -> None:
     lines = [line for line in told["certificate"].splitlines() if "calibration[1]" in line]
     assert [line.split(",")[1:3] for line in lines] == [[b, "height"] for b in HEIGHTS["balls"]]
@@ -317,49 +284,6 @@ def corner_rows(of: dense.Problem, uncertainty: float) -> dense.Values:
         return np.concatenate([dense.residuals(of, step), [-cosine / uncertainty]])
 
     return dense.jacobian(rows, of.parameters)
-
-
-def corner_u6(of: dense.Problem, uncertainty: float) -> float:
-    found = dense.standard_uncertainties(of, dense.spread(corner_rows(of, uncertainty)), ["U6"])
-    return float(found["U6"].mean())
-
-
-@cache
-def angle_goal() -> float:
-    """An average U6 between those with an exact angle and with the one stated."""
-    of = drawn()
-    return (corner_u6(of, 1e-4 * ANGLE_UNCERTAINTY) + corner_u6(of, ANGLE_UNCERTAINTY)) / 2
-
-
-def test_reach_scales_an_angle(told: dict[str, Any]) -> None:
-    of, goal = drawn(), round(angle_goal(), 12)
-    answer = told["reach"]["answers"]["certificate"]
-    number, unit = answer["needed"].split()
-    assert unit == "arcsec" and answer["as_drawn"] == "0.05 arcsec"
-    needed = float(number) * np.pi / 180 / 3600
-    assert answer["needed_value"] == pytest.approx(needed, rel=1e-12)
-    assert corner_u6(of, needed) <= goal < corner_u6(of, 1.011 * needed)
-    both = told["reach both"]["answers"]["certificate"]
-    assert both["as_drawn"] == "0.2 um, 0.05 arcsec"
-    length, angle = both["needed"].split(", ")
-    assert length.endswith(" um") and angle.endswith(" arcsec")
-    assert float(length.split()[0]) / 0.2 == pytest.approx(float(angle.split()[0]) / 0.05, rel=2e-2)
-
-
-def test_repairs_leave_an_angle_alone(told: dict[str, Any]) -> None:
-    text = json.dumps([told["suggested"], told["offered"], told["fixed"]])
-    assert "calibrate the corner" not in text and '"calibration[1]' not in text
-    edits = [
-        edit
-        for one in told["offered"]["repairs"]["partial"]
-        for edit in one["edits"]
-        if edit["path"] == "calibration"
-    ]
-    assert [edit["value"] for edit in edits] == [HEIGHTS]
-    words, fixed = told["fixed"]
-    assert "Traceback" not in words
-    assert yaml.safe_load(fixed)["calibration"] == [SIDES, CORNER]
-    assert len(yaml.safe_load(fixed)["positions"]) > 1
 
 
 def test_certificates_have_the_unit_of_the_kind(told: dict[str, Any]) -> None:

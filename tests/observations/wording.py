@@ -3,7 +3,6 @@
 A_LENGTH_STANDARD_CARRIES_DISTANCES = (
     "calibration[2].kind: a length standard carries distances only"
 )
-DEPENDS_ON_WHERE_THE_FRAME = "depends on where the frame"
 IS_CODE_IN_PYTHON = "object: is code in Python"
 LENGTHS_ARE_READ_AS_INDEPENDENT = "lengths are read as independent"
 NO_RESULT_IS_CALLED = 'no result is called "Later"; it has "Before"'

@@ -1,4 +1,4 @@
-"""What fit, correct, diff, adjust and budget print of campaigns, against least squares and
+"""What fit, correct, diff and budget print of campaigns, against least squares and
 covariances of the dense reference.
 """
 
@@ -370,96 +370,6 @@ def test_diff(path: Path, k: float, capsys: pytest.CaptureFixture[str]) -> None:
         name, size = max(sizes_of, key=lambda pair: pair[1])
         assert agrees(row[1], size, 3)
         assert f"{row[0][:3]} at {row[2]}" in [n for n, s in sizes_of if s > size * (1 - 1e-5)]
-
-
-def test_adjust(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    expected, _, fit = measured(path, capsys, 3)
-    second, _, after_fit = measured(path, capsys, 4)
-    volume = expected.problem.design.machine.volume
-    lower, upper = volume.lower, volume.upper
-    size = upper - lower
-    changes = {"scale": 22e-6, "turn": 12.0 * FACTORS["arcsec"]}
-    # Nobody adjusted the machine, which the second campaign shows.
-    line = ["adjust", fit, "--scale", "x=22 um/m", "--turn", "y-x=12 arcsec"]
-    line += ["--uncertainty", "2%", "--after", after_fit]
-    text = output_of(capsys, *line, status=1)
-    whole = json.loads(output_of(capsys, *line, "--json", status=1))
-    data = whole["quantities"]
-    rows = {row[0]: row[1:] for row in table(text, "quantity ")}
-    weights: dict[str, list[tuple[Real, Real, Real]]] = {}
-    for i, axis in enumerate(AXES):
-        end = lower + np.eye(3)[i] * size
-        weights[f"scale {axis}"] = [(end, lower, np.eye(3)[i] / size[i])]
-    for i, j in ((0, 1), (0, 2), (1, 2)):
-        weights[f"angle {AXES[i]}{AXES[j]}"] = [
-            (lower + np.eye(3)[a] * size, lower, -np.eye(3)[b] / size[a])
-            for a, b in ((i, j), (j, i))
-        ]
-    for signs in ("+++", "++-", "+-+", "+--"):
-        up = np.array([sign == "+" for sign in signs])
-        start, end = np.where(up, lower, upper), np.where(up, upper, lower)
-        weights[f"diagonal {signs}"] = [(end, start, (end - start) / np.linalg.norm(end - start))]
-    assert list(rows) == list(data) == list(weights)
-    ends = np.array(
-        [point for parts in weights.values() for end, start, _ in parts for point in (end, start)]
-    )
-    # Of the tip of the map's probe.
-    both = [
-        (value, root.reshape(*value.shape, -1))
-        for value, root in (one.corrected(ends, offset_of("right")) for one in (expected, second))
-    ]
-    apart_of, roots, first = [], [], 0
-    for name, parts in weights.items():
-        which = slice(first, first := first + 2 * len(parts))
-        points = ends[which]
-        row = np.array([sign * w for _, _, w in parts for sign in (1.0, -1.0)])
-        (before, root), (found, other) = (
-            ((row * (value[which] - points)).sum(), np.tensordot(row, blocks[which], 2))
-            for value, blocks in both
-        )
-        # X reads more, so that true lengths less readings fall; Y leans towards -X.
-        apart = points - lower
-        moved = {
-            "scale": -changes["scale"] * apart * [1.0, 0.0, 0.0],
-            "turn": -changes["turn"] * apart[:, [1]] * [1.0, 0.0, 0.0],
-        }
-        effects = [float((row * moves).sum()) for moves in moved.values()]
-        after = before + sum(effects)
-        u, u_found = np.linalg.norm(root), np.linalg.norm(other)
-        u_after = math.hypot(u, *(0.02 * one for one in effects))
-        told = data[name]
-        assert told["unit"] == {"s": "1", "a": "rad", "d": "m"}[name[0]]
-        shown = {"before": (before, u), "predicted": (after, u_after), "found": (found, u_found)}
-        for key, figures in shown.items():
-            assert told[key]["value"] == pytest.approx(figures[0], abs=2e-3 * figures[1]), name
-            assert told[key]["standard_uncertainty"] == pytest.approx(figures[1], rel=1e-3), name
-        error = (found - after) / (2.0 * math.hypot(u_after, u_found))
-        assert told["normalised_error"] == pytest.approx(error, rel=2e-3, abs=2e-3), name
-        assert within(rows[name][6], error, step_of(error, 4) + 5e-3 * (1.0 + abs(error))), name
-        unit = rows[name][7]
-        assert unit == {"s": "µm/m", "a": "arcsec", "d": "µm"}[name[0]]
-        cells_of = [
-            one
-            for value, spread in shown.values()
-            for one in ((value, spread), (2 * spread, spread))
-        ]
-        for figure, (right, spread) in zip(rows[name], cells_of, strict=False):
-            right /= FACTORS[unit]
-            slack = 5e-3 * spread / FACTORS[unit]
-            assert within(figure, right, step_of(right, 4) + slack), (name, figure, right)
-        if name[0] != "d":
-            apart_of.append(found - after)
-            roots.append(np.concatenate([root, [0.02 * one for one in effects], other]))
-    judge_comparison(whole, text, np.array(apart_of), np.array(roots))
-
-
-def judge_comparison(data: dict[str, Any], text: str, apart: Real, roots: Real) -> None:
-    """A machine that scales and angles differ by so much is not as predicted."""
-    squares = float(apart @ np.linalg.solve(roots @ roots.T, apart))
-    test = data["difference"]["tests"][0]
-    assert test["chi_squared"] > 0.9 * squares > 10 * len(apart)
-    assert data["within"] is False and data["difference"]["changed"] is True
-    assert re.search(r"^not as predicted: a change is shown \(p = ", text, re.M)
 
 
 def test_budget(path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -246,10 +246,11 @@ def _limits(
     if generator.random() < 0.3:
         limits["keep"] = [names[int(generator.integers(len(names)))]]
     if generator.random() < 0.3:
-        limits["never_together"] = [names[-2:]]
+        limits["at_most"] = [{"of": {"name": names[-2:]}, "count": 1}]
     if generator.random() < 0.3:
         limits["at_most"] = [
-            {"of": {"artefact": positions[-1]["artefact"]}, "count": int(generator.integers(2, 4))}
+            *limits.get("at_most", ()),
+            {"of": {"artefact": positions[-1]["artefact"]}, "count": int(generator.integers(2, 4))},
         ]
     return limits
 

@@ -97,7 +97,8 @@ def test_blocks_make_no_difference(
     direct = (rows.T * (0.5 * weights / expected)) @ rows
     np.testing.assert_allclose(derivative, direct, rtol=0.0, atol=1e-12 * np.abs(direct).max())
     # Functions that are listed one by one have the same tangent.
-    listed = Criterion(name, False, Linear(rows, lengths), np.zeros((0, SIZE))).tangent(root, power)
+    whole = Several((Linear(rows, lengths),))
+    listed = Criterion(name, False, whole, np.zeros((0, SIZE))).tangent(root, power)
     np.testing.assert_allclose(listed[2], direct, rtol=0.0, atol=1e-12 * np.abs(direct).max())
 
 
@@ -113,7 +114,7 @@ def test_many_points_take_little_memory() -> None:
     generator = np.random.default_rng(1)
     places, displacement = generator.random((2000, 3)), generator.normal(size=(2000, 3, 4))
     pairs = Pairs(places, displacement, np.zeros((2000, 3, 0)))
-    found = Criterion("U6", False, pairs, np.zeros((0, 4)))
+    found = Criterion("U6", False, Several((pairs,)), np.zeros((0, 4)))
     tracemalloc.start()
     try:
         found.tangent(np.eye(4))

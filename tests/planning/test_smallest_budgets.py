@@ -4,9 +4,8 @@ by a dense rank.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cache
-from itertools import combinations, product
+from itertools import combinations
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -16,7 +15,7 @@ from ballplate.planning.campaign_choice import TINY_POOL, Request, campaign
 from ballplate.planning.constraints import Budget, constraints
 from ballplate.planning.criteria import CriterionName, criterion, is_about_balls
 from ballplate.planning.information import pool_information
-from ballplate.planning.search import LARGE, SMALL_POOL, Losses, SelectionProblem, full_root, value
+from ballplate.planning.search import LARGE, Losses, SelectionProblem, full_root, value
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
@@ -59,18 +58,6 @@ pool:
 """
 COEFFICIENTS = 2
 
-# The same with more candidates than are tried one by one, and the length in a certificate on offer,
-# as good as exact.
-MORE = TEXT.replace("[100 mm, 250 mm]", "[100 mm, 170 mm, 250 mm]")
-EXACT = (
-    MORE.replace(
-        "  - {kind: distances, artefact: wide, pairs: corners, standard_uncertainty: 0.5 um}\n", ""
-    )
-    + """
-  calibration:
-    - {name: exact, artefact: wide, kind: distances, pairs: corners, standard_uncertainty: 1e-7 um, price: 1 h}
-"""
-)
 NAMES: tuple[CriterionName, ...] = ("U5", "U6", "E")
 
 
@@ -161,39 +148,6 @@ def test_a_null_vector_is_found_however_small_its_last_components(last: float) -
     np.testing.assert_allclose(
         root @ root.T, np.eye(size) + (1e6 - 1) * along, rtol=1e-8, atol=1e-8
     )
-
-
-def test_beside_a_certificate_that_is_as_good_as_exact() -> None:
-    experiment = loaded(EXACT)
-    pool = experiment.pool
-    assert pool is not None
-    information = pool_information(experiment, pool.candidates, all_balls=True)
-    certificate = len(pool.candidates) - 1
-    assert certificate >= SMALL_POOL
-    kept = constraints(pool.candidates, pool.changes, Budget(positions=2), (certificate,))
-    problem = SelectionProblem(information, criterion(information, experiment, "U5"), kept)
-    losses = Losses(problem)
-    narrow, wide = (information.placing(name) for name in ("narrow", "wide"))
-    of_names: dict[frozenset[str], float] = {}
-    for pair in product(narrow, wide):
-        chosen = (*pair, certificate)
-        design = lay_out(with_chosen(experiment, [pool.candidates[k] for k in chosen]))
-        reference = dense.planned(design, COEFFICIENTS, COEFFICIENTS)
-        spread = dense.linearised(reference)
-        assert np.isfinite(value(problem, chosen)) == (not spread.deficiency), chosen
-        assert (losses.of(frozenset(chosen)) < LARGE) == (not spread.deficiency), chosen
-        if not spread.deficiency:
-            names = frozenset(pool.candidates[k].name for k in chosen)
-            every = dense.standard_uncertainties(reference, spread, ["U5"])
-            of_names[names] = float(every["U5"].mean())
-    must = replace(experiment, pool=replace(pool, must=(certificate,)))
-    found = campaign(must, Request("U5", Budget(positions=2)))
-    assert found.is_determined
-    # The certificate outweighs readings by 1e8, which leaves half of the digits.
-    assert found.value == pytest.approx(
-        of_names[frozenset(one.name for one in found.chosen)], rel=1e-7
-    )
-    assert found.value <= 1.01 * min(of_names.values())
 
 
 POSITIONS_ALONE = SMALL[: SMALL.index("  calibration:\n    - {name: sides")].replace(

@@ -6,15 +6,10 @@ HAS_TO_BE_CHOSEN = '"low" has to be chosen, but was interrupted'
 INCLUDES_THE_DISTANCES = (
     'U5 includes the distances of ".*", but no position of this artefact can be read'
 )
-KEPT_AS_WELL = "seed: 5   # kept as well"
-LOW_AGAIN_WAS_INTERRUPTED_AFTER_READINGS = (
-    "low again was interrupted after 7 readings; 2 more complete it"
-)
 LOW_AS_IT_STANDS = "as it stands: flat"
 LOW_WAS_INTERRUPTED_AFTER_READINGS = "low was interrupted after 5 readings; 4 more complete it"
 NO_CHOICE_WAS_FOUND_THAT_DETERMINES = "no choice was found that determines every parameter"
 NO_MORE_THAN_OF_THEM = "at most 1 may be chosen"
-NO_POSITION_CAN_BE_READ = "no position can be read with 0.1 h; allow more"
 NO_POSITION_CAN_BE_READ_AS_LIMITS = "limits: no position can be read, as limits exclude"
 NO_POSITION_CAN_BE_READ_WITH_ALLOW = "no position can be read with 0.01 h; allow more"
 NO_POSITION_DID_YOU_MEAN = 'other.csv:2:1: no position "lo".*did you mean "low"'

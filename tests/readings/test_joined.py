@@ -221,16 +221,15 @@ def assert_chain_rows_agree(experiment: bp.Experiment) -> None:
         assert often == pytest.approx(precise, rel=1e-6)
 
 
-@pytest.mark.slow
 def test_the_row_of_the_chain_is_that_of_more_precise_readings() -> None:
     """It was of metres where any position had repeats."""
     compared = 0
-    for experiment in (experiment for path in SHIPPED for experiment in shipped(path)):
+    for experiment in (experiment for path in SHIPPED[::5] for experiment in shipped(path)):
         lengths = bp.run(experiment).quantities.get("U6")
         if hasattr(experiment.error_model, "arrangement") and lengths and lengths.average > 0.0:
             assert_chain_rows_agree(experiment)
             compared += 1
-    assert compared > 25
+    assert compared > 3
 
 
 def with_standards() -> bp.Experiment:
@@ -289,7 +288,6 @@ WITHOUT_A_JOIN = {
     "analysis/api.py": "a table of the readings",
     "analysis/cli/simulate.py": "a table of the readings",
     "analysis/extensions/certificates/interface.py": "values of certificates alone",
-    "analysis/extensions/judgement/bootstrap.py": "made of the rows of the design",
     "analysis/montecarlo/reference.py": "made of the rows of the design",
 }
 

@@ -1,6 +1,4 @@
-"""Values of certificates in a file beside the readings: they count with whatever options, and are
-compared with one another and with the probes as those of the experiment file are.
-"""
+"""Values of certificates in a file beside the readings count with whatever options."""
 
 from __future__ import annotations
 
@@ -11,11 +9,6 @@ import ballplate as bp
 import pandas as pd
 import pytest
 from ballplate.cli import main
-from ballplate.extensions.certificates.certificate_files import read_certificate
-from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.inputs.yamltree import GivenText
-
-from tests.readings import wording
 
 QUICKSTART = "designs/quickstart.yaml"
 
@@ -53,7 +46,7 @@ def test_options_of_tables_do_not_undo_a_certificate(
 SIDES = ["r1c1", "r1c5", "r5c5", "r5c1"]
 
 
-def test_exact_values_of_a_file_are_compared_with_one_another(
+def test_a_fit_names_exact_values_of_a_file_that_no_plate_has(
     experiment: bp.Experiment, readings: pd.DataFrame
 ) -> None:
     """Four sides and two diagonals of a plane square: five of them make the sixth."""
@@ -75,36 +68,5 @@ def test_exact_values_of_a_file_are_compared_with_one_another(
     # Both diagonals longer than those of a square: bending makes one of them shorter.
     wrong = right.copy()
     wrong.loc[wrong["value"].str.startswith("1060"), "value"] = "1060.67 mm"
-    with pytest.raises(ExperimentError, match=wording.STATED_AS_EXACT_CONTRADICT_ONE_ANOTHER):
-        bp.fit(exact, readings, certificate=wrong)
-
-
-def test_a_star_of_a_file_is_compared_with_the_offsets(
-    readings: pd.DataFrame,
-    experiment: bp.Experiment,
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    star = experiment.with_(stars=[{"standard_uncertainty": "0.2 um"}])
-    right = bp.certificate(star)
-    assert not any("exchanged" in one for one in bp.fit(star, readings, certificate=right).warnings)
-    names = {"right": "back", "back": "right"}
-    of_star = right["item"] == "stars[0]"
-    wrong = right.assign(first=right["first"].where(~of_star, right["first"].replace(names)))
-    found = read_certificate(GivenText("own.csv", wrong.to_csv(index=False)), star)
-    (told,) = found.doubts
-    assert told.startswith(wording.ITS_TIPS_ARE_UP)
-    assert 'most of all "right", "back"' in told
-    # Whatever else is made of the readings tells of a table as well.
-    down = of_star & (right["first"] == "down") & (right["second"] == "z")
-    apart = right.assign(value=right["value"].where(~down, "-55 mm"))
-    judged = bp.validate(star, readings, certificate=apart)
-    assert sum(wording.MM_FROM_THE_STATED_OFFSETS in one for one in judged.warnings) == 1
-    text = Path(QUICKSTART).read_text(encoding="utf-8")
-    (tmp_path / "star.yaml").write_text(f"{text}\nstars: [{{standard_uncertainty: 0.2 um}}]\n")
-    wrong.to_csv(tmp_path / "wrong.csv", index=False)
-    readings.to_csv(tmp_path / "readings.csv", index=False)
-    files = [str(tmp_path / "star.yaml"), str(tmp_path / "readings.csv")]
-    main(["fit", *files, "--certificate", str(tmp_path / "wrong.csv"), "-q"])
-    err = capsys.readouterr().err
-    assert err.count("most of all") == 1 and "warning: " in err
+    contradicted = bp.fit(exact, readings, certificate=wrong)
+    assert not contradicted.converged and "values stated as exact" in str(contradicted)

@@ -194,7 +194,7 @@ FILES = (
         "tables-readings.csv",
         "small-certificate.csv",
     ),
-    *("curve.csv", "balls.csv", "sweep.sqlite", "trials.sqlite", "results.json", "planned.yaml"),
+    *("curve.csv", "balls.csv", "sweep.sqlite", "trials.sqlite", "planned.yaml"),
 )
 # Options whose values may be large without much work; of others a large one is meant to take long,
 # and may.

@@ -165,7 +165,6 @@ WILD: dict[str, list[Any]] = {
     ],
     "probes": [[["down"]] * 1000, {"x": ["down"]}, [["down"], "down"], {"x": [], "y": [[]]}],
     "keep": ["all", ["x" * 5000], [], ["flat low"] * 1000],
-    "never_together": [[[]], [["flat low", "flat low"]], [["flat low"] * 5000]],
     "at_most": [
         [{"of": {"name": "*" * 60 + "z"}, "count": 1}],
         [{"of": {"name": "["}, "count": 0}],

@@ -93,8 +93,8 @@ errors:
 squareness: {EC0Y: 21 urad}
 """
 
-CURVE = "position_mm,error_um,u_um\n" + "".join(
-    f"{20 * k},{error},0.2\n"
+CURVE = "position_mm,error_um\n" + "".join(
+    f"{20 * k},{error}\n"
     for k, error in enumerate((0, 0.5, 0.8, 0.4, -0.1, -0.3, 0.2, 0.9, 1.4, 1.1, 0.6, 0.1))
 )
 
@@ -144,8 +144,6 @@ def make_kit(folder: Path) -> None:
         (folder / name).write_text(text, encoding="utf-8")
     _make_readings(folder)
     _make_stores(folder)
-    answers = outcome(["reproduce", "certified", "--designs", "certified", "--json"], folder)[1]
-    (folder / "results.json").write_text(answers, encoding="utf-8")
     (folder / "junk.bin").write_bytes(bytes(range(256)) * 8)
     (folder / "empty.txt").write_bytes(b"")
     (folder / "folder").mkdir()
@@ -182,7 +180,7 @@ def _make_readings(folder: Path) -> None:
         variant = ["--variant", VARIANTS[name]] if name in VARIANTS else []
         again = ["-o", f"{name}-again.csv", "--seed", "9"]
         _ballplate(folder, "simulate", f"{name}.yaml", *again, *variant)
-    for name, readings in (("map.yaml", "small-readings.csv"), ("map.npz", "small-again.csv")):
+    for name, readings in (("map.yaml", "small-readings.csv"), ("again.yaml", "small-again.csv")):
         _ballplate(folder, "fit", "small.yaml", readings, "-o", name, "--date", "2026-11-22")
     points = "name,probe,x_mm,y_mm,z_mm\nA,down,50,200,100\nB,right,450,200,100\n"
     (folder / "to-correct.csv").write_text(points, encoding="utf-8")

@@ -33,9 +33,6 @@ RECIPES = (
     "reach small.yaml --by certificate --target '5 um' --json",
     "reach bar-bell.yaml --variant 'length known' --by certificate --calibration 0 --artefact bar",
     "reach small.yaml --by repeats --goal tasks",
-    "'run --lengths' small.yaml --grid 3 -o out.csv",
-    "'run --lengths' tables.yaml --grid 3,2,2 --target '1 um + L/100000' --probe right --json",
-    "'run --lengths' small.yaml --grid 2 --coverage-factor 2 --with-repeatability --fail",
     "'run --errors' small.yaml",
     "'run --errors' tables.yaml --json",
     "'run --reliability' small.yaml -o out.csv",
@@ -66,20 +63,13 @@ RECIPES = (
         " country=DE --json"
     ),
     "certificate tables.yaml tables-readings.csv -o out.csv --datum all --coverage-factor 3",
-    (
-        "adjust map.yaml --scale 'x=22 um/m' --turn 'y+x=0.02 turns of 1 mm at 400 mm'"
-        " --after map.npz -o out.yaml"
-    ),
-    "adjust map.yaml --scale 'x=2 um/m' --uncertainty 2% --json",
-    "adjust map.yaml --turn 'y-x=2 arcsec' --after map.npz --force -o out.npz",
-    "fit small.yaml small-readings.csv -o new.npz --date 2026-11-22",
+    "fit small.yaml small-readings.csv -o new.yaml --date 2026-11-22",
     "correct map.yaml to-correct.csv --length A B --tasks small.yaml",
-    "correct map.npz to-correct.csv -o out.csv --covariance covariance.csv --coverage-factor 3 --json",
+    "correct again.yaml to-correct.csv -o out.csv --covariance covariance.csv --coverage-factor 3 --json",
     "correct map.yaml small-readings.csv --probe right --with-repeatability",
-    "diff map.yaml map.npz --grid 2 -o out.csv",
+    "diff map.yaml again.yaml --grid 2 -o out.csv",
     "diff machine.yaml map.yaml --stated '1 um + L/1000000' --json",
-    "diff map.yaml map.npz --grid 2 --plot out.svg --dates 2025-01-01 2026-01-01 --fail",
-    "fit small.yaml small-readings.csv --trials 2 --seed 3 --workers 1",
+    "diff map.yaml again.yaml --grid 2 --plot out.svg --dates 2025-01-01 2026-01-01 --fail",
     "models small.yaml small-readings.csv --coefficients 3",
     (
         "models tables.yaml tables-readings.csv --certificate tables-certificate.csv --sigma given"
@@ -90,8 +80,6 @@ RECIPES = (
         "diff tables.yaml tables.yaml --readings tables-readings.csv tables-again.csv"
         " --shared certificate --json"
     ),
-    "'map --convert' map.yaml --to empirical -o out.yaml",
-    "'map --convert' map.npz --to '{kind: kinematic, position_coefficients: 3}' --json",
     "compare small.yaml --trials 2 --points 5 --pairs braced --seed 2",
     (
         "compare bar-bell.yaml --variant 'length known' --trials 2 --points 5 --estimator"
@@ -107,7 +95,6 @@ RECIPES = (
     "'sweep --export' trials.sqlite -o out.parquet --sweep 1",
     "'sweep --export' trials.sqlite -o -",
     "'sweep --report' sweep.sqlite -o out.html",
-    "'sweep --report' trials.sqlite --format csv",
     "'sweep --report' sweep.sqlite --format markdown",
     "'sweep --report' trials.sqlite --format latex",
     "'sweep --report' trials.sqlite --format text",
@@ -119,27 +106,21 @@ RECIPES = (
     "map machine.yaml --line 'y = 300 mm, z = 200 mm' --points 3 --json",
     "map gec-like.yaml --grid 2,3,4 --format csv",
     "map gec-like.yaml --grid 2,2,2 --plot out.svg",
-    "map map.yaml --grid 3,2,2 --budget --draw 3 --seed 4 --tasks small.yaml",
-    "map map.npz --plane 'z = 200 mm' --grid 3,3 --probe right --plot out.svg --json",
+    "map map.yaml --grid 3,2,2 --draw 3 --seed 4",
+    "map again.yaml --plane 'z = 200 mm' --grid 3,3 --probe right --plot out.svg --json",
     "map map.yaml --points to-correct.csv --format csv",
     "'map --curves' map.yaml",
-    "'map --curves' map.npz --error EXX --error EC0Y --points 5 --format csv",
+    "'map --curves' again.yaml --error EXX --error EC0Y --points 5 --format csv",
     "map machine.yaml --line '0 mm, 0 mm, 0 mm to 600 mm, 500 mm, 400 mm' --plot out.svg",
-    "spline curve.csv --evaluate '10 mm, 50 mm' -o out.csv --powers global",
-    (
-        "spline curve.csv --every 3 --start-value '0 um' --end-slope '1 um/mm' --at '60 mm' slope 0"
-        " --plot out.svg"
-    ),
-    "spline curve.csv --knots '50 mm, 100 mm' --order 3 --json --sigma estimated --period '240 mm'",
+    "spline curve.csv --every 3 --start-value '0 um' --end-slope '1 um/mm' --plot out.svg",
+    "spline curve.csv --knots '50 mm, 100 mm' --json -o out.csv --powers global",
     "spline table-1.csv --x arc_length --y finish_error --boundary '100 mm' --points 1-30 --json",
-    ("spline table-1.csv --y finish_error --straight 1 --uncertainty '1 um' --whiskers out.svg"),
+    "spline table-1.csv --y finish_error --straight 1 --whiskers out.svg",
     (
         "spline table-1.csv --y semi_finish_error --points 1-10 --corner '44.704 mm, -114.554 mm'"
         " --straight 1 --straight 2 --knots none --compensated out.csv"
     ),
     "reproduce npl --designs npl --experiment 5.2 --quick",
-    "reproduce certified --designs certified --experiment weak --json",
-    "reproduce certified --designs certified --experiment weak --results results.json",
     "schema machine",
     "schema sweep",
     "'run --budget' small.yaml --by position",

@@ -301,7 +301,6 @@ def _rows(random: Random, connection: sqlite3.Connection) -> str:
             "DELETE FROM result WHERE key > (SELECT key FROM result LIMIT 1)",
             "DELETE FROM result",
             "DELETE FROM cell WHERE number % 2 = 0",
-            "DELETE FROM bundle",
             "DELETE FROM about",
             "DELETE FROM sweep",
             "UPDATE sweep SET id = 7",

@@ -37,7 +37,6 @@ FIRST = {line.partition(" ")[0]: line for line in reversed(RECIPES) if "dry-run"
 COMMANDS = (
     *FIRST.values(),
     "run small.yaml --trials 600 --seed 3 --workers 2",
-    "fit small.yaml small-readings.csv --trials 40 --seed 3 --workers 2",
     "plan pool.yaml --hours 2 --curve --workers 2",
     "sweep trials.yaml --workers 2 --store new.sqlite",
     "sweep own.yaml --workers 2",

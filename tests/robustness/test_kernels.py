@@ -61,7 +61,6 @@ COMMANDS = [
     "fit npl.yaml npl.csv --variant B",
     "simulate centred.yaml -o centred.csv",
     "fit centred.yaml centred.csv",
-    "run --lengths centred.yaml",
     "plan pool.yaml --positions 3 --workers 1",
 ]
 

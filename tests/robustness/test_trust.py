@@ -20,9 +20,6 @@ from ballplate.extensions.studio.jobs import JOBS
 from ballplate.extensions.studio.session import Session
 from ballplate.simulator.inputs.yamltree import parse_tree, to_list, to_python
 
-from tests.extensions.sweeps.odd_stores import signed
-from tests.extensions.sweeps.stores import axis, done, made_up
-
 BASE = to_list(
     to_python(parse_tree(Path(shipped("quickstart.yaml")).read_text(), "quickstart.yaml"))
 )
@@ -106,7 +103,6 @@ READ: dict[str, dict[str, Any]] = {
     "a machine file's table": {"error_model": {"kind": "machine", "file": "machine.yaml"}},
     "a map of a machine file": {"true_machine": {"kind": "map", "file": "machine-map.yaml"}},
     "a map in Python": {"true_machine": {"kind": "map", "file": "map.yaml"}},
-    "a map in Python, as arrays": {"true_machine": {"kind": "map", "file": "map.npz"}},
     "a map as prior": {"priors": [{"kind": "map", "file": "map.yaml"}]},
     # Found where Python looks for modules.
     "an installed module": {"error_model": {"kind": "python", "object": "canary:build"}},
@@ -234,25 +230,8 @@ def house(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fitted: bp.FittedMap)
     ):
         for folder in (inside, outside):
             changed = re.sub(r"(?m)^error_model: .*$", f"error_model: {json.dumps(settings)}", text)
-            (folder / name).write_text(
-                re.sub(r"(?m)^(checksum|check|files):.*\n(- .*\n)*", "", changed)
-            )
-    python_map(inside)
+            (folder / name).write_text(re.sub(r"(?m)^(checksum|files):.*\n(- .*\n)*", "", changed))
     return inside
-
-
-def python_map(folder: Path) -> None:
-    """The map in Python as arrays."""
-    import numpy as np
-
-    bp.write_map(bp.load_map(folder / "plain.yaml"), folder / "map.npz")
-    with np.load(folder / "map.npz") as found:
-        arrays = {name: found[name] for name in found.files}
-    head = json.loads(str(arrays["map"])) | {"error_model": python(".")}
-    arrays["map"] = np.array(
-        json.dumps({key: head[key] for key in head if key not in ("checksum", "check", "files")})
-    )
-    np.savez(folder / "map.npz", **arrays)
 
 
 def checked(folder: Path, sections: dict[str, Any], *options: str) -> None:
@@ -260,32 +239,6 @@ def checked(folder: Path, sections: dict[str, Any], *options: str) -> None:
     assert main(["check", "--no-modules", *options, "design.yaml"]) == (
         0 if "files" in sections.get("readings", {}) else 3
     )
-
-
-def reported(folder: Path, sections: dict[str, Any]) -> None:
-    """A page of a store that came from elsewhere, with all files of the folder in it."""
-    figures = {"U4_maximum_m": 2e-6, "U4_average_m": 1e-6, "U4_undetermined": 0.0}
-    store = made_up(
-        folder / "own.sqlite", "own", [axis("k", ["1 um"], [1e-6], "m")], [done(0, figures)]
-    )
-    sweep = (
-        "title: own\nbase: base.yaml\naxes:\n  k: {path: machine.repeatability, values: [1 um]}\n"
-    )
-    contents = {"made-up.yaml": sweep.encode(), "base.yaml": json.dumps(sections).encode()}
-    contents |= {
-        path.name: path.read_bytes()
-        for path in folder.iterdir()
-        if path.suffix in (".yaml", ".npz")
-    }
-    rows = [(1, name, content) for name, content in contents.items()]
-    store.connection.executemany("INSERT INTO bundle (sweep, path, content) VALUES (?, ?, ?)", rows)
-    store.close()
-    signed(store.path)
-    assert main(["sweep", "--report", "own.sqlite", "-o", "own.html"]) == 0
-    page = (folder / "own.html").read_text(encoding="utf-8")
-    # Readings are for a fit, and nothing of them is read for a drawing.
-    refused = "modules are not allowed here" in page or "files are read from here" in page
-    assert refused != ("readings" in sections and "files" in sections["readings"])
 
 
 def looked_at(folder: Path, sections: dict[str, Any]) -> None:
@@ -308,16 +261,13 @@ DOORS: dict[str, Callable[[Path, dict[str, Any]], None]] = {
     "check": checked,
     "check --suggest": lambda folder, sections: checked(folder, sections, "--suggest"),
     "check --fix": lambda folder, sections: checked(folder, sections, "--fix"),
-    "report": reported,
     "studio": looked_at,
 }
 
 
 IN_PYTHON = [key for key in READ if re.search("[Pp]ython|module|folder", key)]
 # Repairs read the same files as the plain check, and the studio's user has chosen the file: it may read others.
-TRIED = [
-    (door, key) for door in DOORS for key in (READ if door in ("check", "report") else IN_PYTHON)
-]
+TRIED = [(door, key) for door in DOORS for key in (READ if door == "check" else IN_PYTHON)]
 
 
 @pytest.mark.parametrize(("door", "key"), TRIED)

@@ -5,18 +5,17 @@ from __future__ import annotations
 import mpmath
 import numpy as np
 import pytest
-from ballplate.simulator.splines.constraints import Constraint, periodic, prescribed, rows, straight
+from ballplate.simulator.splines.constraints import Constraint, rows, straight
 from ballplate.simulator.splines.knots import at_every, with_boundaries
 from ballplate.simulator.splines.polynomial_pieces import pieces
 from ballplate.simulator.splines.space import SplineSpace
-from ballplate.simulator.splines.spline_fit import SplineFit, fit
+from ballplate.simulator.splines.spline_fit import fit
 from ballplate.simulator.splines.spline_problems import SplineError
-from hypothesis import assume, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline, make_lsq_spline
 
 from tests.reference import truncated_powers
-from tests.splines import wording
 
 EPSILON = np.finfo(float).eps
 
@@ -33,7 +32,7 @@ def clamped(
     """The document's four conditions, equation (12)."""
     ends = (space.lower, space.upper)
     return tuple(
-        prescribed(end, k, value)
+        Constraint(end, k, value)
         for k, both in enumerate((values, slopes))
         for end, value in zip(ends, both, strict=True)
     )
@@ -54,7 +53,7 @@ def test_pseudo_inverses_give_the_same_curve_where_truncated_powers_are_well_con
 ) -> None:
     x, y = noisy(40, 0.0, 1.0, seed)
     space = SplineSpace(4, 0.0, 1.0, at_every(x, every, 0.0, 1.0))
-    fitted = fit(space, x, y, None, clamped(space, (0.1, -0.9), (4.0, 0.5)))
+    fitted = fit(space, x, y, clamped(space, (0.1, -0.9), (4.0, 0.5)))
     knots, conditions = np.array(space.knots), document_rows(space)
     c = truncated_powers.constrained(
         x, y, knots, conditions, np.array([0.1, -0.9, 4.0, 0.5]), 1e-12
@@ -80,7 +79,7 @@ def test_the_documents_formula_with_sixty_digits_gives_the_same_curve_for_any_ab
     x, y = noisy(20, lower, upper)
     space = SplineSpace(4, lower, upper, at_every(x, 5, lower, upper))
     slope = 3.0 / (upper - lower)
-    fitted = fit(space, x, y, None, clamped(space, (0.1, -0.9), (slope, 0.0)))
+    fitted = fit(space, x, y, clamped(space, (0.1, -0.9), (slope, 0.0)))
     knots = np.array(space.knots)
     with mpmath.workdps(60):
         design = _exact_powers(x, knots)
@@ -130,7 +129,7 @@ def test_double_precision_pseudo_inverses_fail_far_from_zero_and_in_small_units(
     x, y = noisy(20, lower, upper)
     space = SplineSpace(4, lower, upper, at_every(x, 5, lower, upper))
     slope = 3.0 / (upper - lower)
-    fitted = fit(space, x, y, None, clamped(space, (0.1, -0.9), (slope, 0.0)))
+    fitted = fit(space, x, y, clamped(space, (0.1, -0.9), (slope, 0.0)))
     knots, values = np.array(space.knots), np.array([0.1, -0.9, slope, 0.0])
     design = truncated_powers.powers(x, knots)
     assert np.linalg.cond(design) > 1e13
@@ -140,36 +139,29 @@ def test_double_precision_pseudo_inverses_fail_far_from_zero_and_in_small_units(
     # The fit itself is indifferent to unit and origin.
     t = (x - lower) / (upper - lower)
     same = SplineSpace(4, 0.0, 1.0, tuple((knots - lower) / (upper - lower)))
-    scaled = fit(same, t, y, None, clamped(same, (0.1, -0.9), (3.0, 0.0)))
+    scaled = fit(same, t, y, clamped(same, (0.1, -0.9), (3.0, 0.0)))
     np.testing.assert_allclose(fitted.values(x), scaled.values(t), rtol=0, atol=1e-11)
 
 
 def test_no_constraints_is_the_least_squares_spline_of_scipy() -> None:
     x, y = noisy(50, 2.0, 5.0)
-    u = np.random.default_rng(3).uniform(0.5, 2.0, 50)
-    fitted = fit(SplineSpace(4, 2.0, 5.0, (3.0, 4.0, 4.0)), x, y, u)
-    other = make_lsq_spline(x, y, [2.0] * 4 + [3.0, 4.0, 4.0] + [5.0] * 4, 3, w=1.0 / u)
+    fitted = fit(SplineSpace(4, 2.0, 5.0, (3.0, 4.0, 4.0)), x, y)
+    other = make_lsq_spline(x, y, [2.0] * 4 + [3.0, 4.0, 4.0] + [5.0] * 4, 3)
     np.testing.assert_allclose(fitted.coefficients, other.c, rtol=1e-10)
 
 
 def test_as_many_constraints_as_freedom_is_interpolation() -> None:
     x, y = noisy(9, 0.0, 4.0)
     space = SplineSpace(4, 0.0, 4.0, tuple(x[1:-1]))
-    fitted = fit(space, x, y, None, (prescribed(0.0, 1, 2.0), prescribed(4.0, 1, -1.0)))
+    fitted = fit(space, x, y, (Constraint(0.0, 1, 2.0), Constraint(4.0, 1, -1.0)))
     places = np.linspace(0.0, 4.0, 101)
     other = CubicSpline(x, y, bc_type=((1, 2.0), (1, -1.0)))
     np.testing.assert_allclose(fitted.values(places), other(places), atol=1e-12)
     assert fitted.degrees_of_freedom == 0 and np.isnan(fitted.sigma)
 
-    y[-1] = y[0]
-    closed = fit(space, x[:-1], y[:-1], None, periodic(space))
-    np.testing.assert_allclose(
-        closed.values(places), CubicSpline(x, y, bc_type="periodic")(places), atol=1e-12
-    )
-
-    ends = (*clamped(space, (0.0, 1.0), (0.0, 0.0)), prescribed(0.0, 2, 0.0))
+    ends = (*clamped(space, (0.0, 1.0), (0.0, 0.0)), Constraint(0.0, 2, 0.0))
     alone = SplineSpace(4, 0.0, 4.0, (2.0,))
-    decided = fit(alone, np.array([1.0]), np.array([9.0]), None, ends)
+    decided = fit(alone, np.array([1.0]), np.array([9.0]), ends)
     assert decided.free == 0 and decided.degrees_of_freedom == 1
     assert decided.spread(places).max() == 0.0
 
@@ -177,7 +169,7 @@ def test_as_many_constraints_as_freedom_is_interpolation() -> None:
 @st.composite
 def problems(
     draw: st.DrawFn,
-) -> tuple[SplineSpace, np.ndarray, np.ndarray, np.ndarray, tuple[Constraint, ...]]:
+) -> tuple[SplineSpace, np.ndarray, np.ndarray, tuple[Constraint, ...]]:
     order = draw(st.integers(2, 6))
     lower = draw(st.sampled_from([0.0, -3.0, 1e3]))
     length = draw(st.sampled_from([1.0, 1e-3, 60.0]))
@@ -193,24 +185,23 @@ def problems(
         )
     )
     x = np.clip(x, space.lower, space.upper)
-    y, u = generator.standard_normal(61), generator.uniform(0.5, 2.0, 61)
     found = []
-    for end, side in ((space.lower, "above"), (space.upper, "below")):
+    for end in (space.lower, space.upper):
         for k in range(min(order - 1, 2)):
             if draw(st.booleans()):
                 value = draw(st.sampled_from([0.0, 1.0, -0.7])) / length**k
-                found.append(prescribed(end, k, value, side))  # type: ignore[arg-type]
-    return space, x, y, u, tuple(found)
+                found.append(Constraint(end, k, value))
+    return space, x, generator.standard_normal(61), tuple(found)
 
 
-@settings(max_examples=60)
+@settings(max_examples=60, deadline=None)
 @given(problems())
 def test_constraints_hold_and_nothing_that_meets_them_fits_better(
-    problem: tuple[SplineSpace, np.ndarray, np.ndarray, np.ndarray, tuple[Constraint, ...]],
+    problem: tuple[SplineSpace, np.ndarray, np.ndarray, tuple[Constraint, ...]],
 ) -> None:
-    space, x, y, u, constraints = problem
+    space, x, y, constraints = problem
     try:
-        fitted = fit(space, x, y, u, constraints)
+        fitted = fit(space, x, y, constraints)
     except SplineError as error:
         if "contradicts" in str(error):
             # Straight lines and parabolas without knots cannot meet all four.
@@ -226,17 +217,17 @@ def test_constraints_hold_and_nothing_that_meets_them_fits_better(
         return
     scale = np.abs(fitted.coefficients).max() + np.abs(y).max()
     for constraint in constraints:
-        assert (
-            abs(fitted.violation(constraint)) * space.length**constraint.derivative < 1e-12 * scale
-        )
+        at = np.array([constraint.at])
+        missed = fitted.values(at, constraint.derivative)[0] - constraint.value
+        assert abs(missed) * space.length**constraint.derivative < 1e-12 * scale
     # The gradient is a combination of the constraints' rows: Lagrange's conditions.
-    design = space.rows(x) / u[:, None]
-    gradient = design.T @ (design @ fitted.coefficients - y / u)
+    design = space.rows(x)
+    gradient = design.T @ (design @ fitted.coefficients - y)
     matrix, _ = rows(space, constraints)
     multipliers = np.linalg.lstsq(matrix.T, gradient, rcond=None)[0] if constraints else np.zeros(0)
     assert np.abs(gradient - matrix.T @ multipliers).max() < 1e-9 * scale
     # Covariance: the first block of the inverse of Lagrange's matrix.
-    if not fitted.redundant:
+    if np.linalg.matrix_rank(matrix, 1e-10) == len(constraints):
         n, m = space.count, len(constraints)
         whole = np.block([[design.T @ design, matrix.T], [matrix, np.zeros((m, m))]])
         np.testing.assert_allclose(
@@ -244,33 +235,15 @@ def test_constraints_hold_and_nothing_that_meets_them_fits_better(
         )
 
 
-@settings(max_examples=30)
-@given(problems())
-def test_polynomials_of_the_pieces_are_the_curve(
-    problem: tuple[SplineSpace, np.ndarray, np.ndarray, np.ndarray, tuple[Constraint, ...]],
-) -> None:
-    space, x, y, u, _ = problem
-    # Between two knots of full multiplicity there may be fewer points than coefficients.
-    assume(np.linalg.matrix_rank(space.rows(x)) == space.count)
-    fitted = fit(space, x, y, u)
-    for powers in ("local", "global"):
-        found = pieces(fitted, powers)  # type: ignore[arg-type]
-        bound = 20 * EPSILON * found.cancellation() * np.abs(found.values(x)).max()
-        if powers == "local":
-            # Whatever the origin of x.
-            bound = min(bound, 1e-12 * np.abs(y).max())
-        np.testing.assert_allclose(found.values(x), fitted.values(x), rtol=0, atol=bound)
-
-
 def test_powers_of_x_are_those_of_the_documents_recursion() -> None:
     x, y = noisy(30, 0.0, 2.0)
     space = SplineSpace(4, 0.0, 2.0, at_every(x, 5, 0.0, 2.0))
-    fitted = fit(space, x, y, None, clamped(space, (0.0, 0.0), (1.0, 0.0)))
+    fitted = fit(space, x, y, clamped(space, (0.0, 0.0), (1.0, 0.0)))
     knots, values = np.array(space.knots), np.array([0.0, 0.0, 1.0, 0.0])
     c = truncated_powers.constrained(x, y, knots, document_rows(space), values, 1e-12)
     wanted = truncated_powers.pieces(c, knots)
     np.testing.assert_allclose(
-        pieces(fitted, "global").coefficients, wanted, rtol=0, atol=1e-9 * np.abs(wanted).max()
+        pieces(fitted, local=False), wanted, rtol=0, atol=1e-9 * np.abs(wanted).max()
     )
 
 
@@ -280,27 +253,17 @@ def test_sigma_and_the_band_cover_as_they_say() -> None:
     """
     x = np.linspace(0.0, 1.0, 15)
     space = SplineSpace(4, 0.0, 1.0, (0.5,))
-    ends = (prescribed(0.0, 1, 0.0),)
-    truth = fit(space, x, np.sin(3 * x), None, ends)
+    ends = (Constraint(0.0, 1, 0.0),)
+    truth = fit(space, x, np.sin(3 * x), ends)
     generator = np.random.default_rng(np.random.SeedSequence(7))
     places = np.array([0.0, 0.3, 1.0])
     found = [
-        fit(space, x, truth.values(x) + 0.1 * generator.standard_normal(15), None, ends)
+        fit(space, x, truth.values(x) + 0.1 * generator.standard_normal(15), ends)
         for _ in range(1200)
     ]
     curves = np.array([one.values(places) for one in found])
     np.testing.assert_allclose(curves.std(axis=0), 0.1 * truth.spread(places), rtol=0.08)
     assert np.mean([one.sigma**2 for one in found]) == pytest.approx(0.01, rel=0.05)
-
-
-def test_points_count_by_their_uncertainties() -> None:
-    x, y = noisy(20, 0.0, 1.0)
-    space = SplineSpace(4, 0.0, 1.0)
-    u = np.ones(20)
-    u[4] = np.sqrt(0.5)
-    once, twice = fit(space, x, y, u), fit(space, np.append(x, x[4]), np.append(y, y[4]))
-    np.testing.assert_allclose(once.coefficients, twice.coefficients, rtol=1e-12)
-    np.testing.assert_allclose(once.spread(x), twice.spread(x), rtol=1e-12)
 
 
 def test_features_share_value_and_slope_and_no_more() -> None:
@@ -310,7 +273,7 @@ def test_features_share_value_and_slope_and_no_more() -> None:
     space = SplineSpace(
         4, 0.0, 3.0, with_boundaries(at_every(x, 8, 0.0, 3.0, boundaries), boundaries, 4)
     )
-    fitted = fit(space, x, y, None, straight(space, 2.5, 3.0))
+    fitted = fit(space, x, y, straight(space, 2.5, 3.0))
     for k, largest in ((0, 1e-12), (1, 1e-11)):
         jumps = fitted.values(np.array(boundaries), k) - fitted.values(
             np.array(boundaries), k, "below"
@@ -332,42 +295,33 @@ def test_a_band_of_points_that_leaves_the_curve_open_is_named() -> None:
     with pytest.raises(SplineError) as error:
         fit(SplineSpace(4, 0.0, 1.0, (0.35, 0.5, 0.6, 0.7, 0.8)), x, x)
     told = [problem.told(lambda place: f"{1e3 * place:g} mm") for problem in error.value.problems]
-    assert told == [wording.THE_CURVE_LACKS_POINTS_BETWEEN_MM]
-    with pytest.raises(SplineError, match=wording.LACKS_POINT_BETWEEN_AND_WHERE):
+    assert told == [
+        "the curve lacks 3 points between 350 mm and 1000 mm, where it has 2; leave out knots or"
+        " prescribe more"
+    ]
+    with pytest.raises(SplineError, match="lacks 1 point between 0.5 and 1, where it has 1"):
         fit(SplineSpace(2, 0.0, 1.0, (0.5,)), np.array([0.0, 0.2, 0.5]), np.zeros(3))
 
 
-def test_contradictions_and_repetitions_are_told() -> None:
+def test_contradictions_are_told_and_repetitions_count_once() -> None:
     x, y = noisy(12, 0.0, 1.0)
-    space = SplineSpace(4, 0.0, 1.0)
-    twice = (prescribed(0.0, 1, 0.5), prescribed(0.0, 1, 0.5))
-    assert fit(space, x, y, None, twice).redundant == (twice[1],)
-    with pytest.raises(
-        SplineError,
-        match=wording.THE_SLOPE_AT_IS_PRESCRIBED_TWICE,
+    cubic, line = SplineSpace(4, 0.0, 1.0), SplineSpace(2, 0.0, 1.0)
+    assert fit(cubic, x, y, (Constraint(0.0, 1, 0.5),) * 2).free == 3
+    for space, told, conditions in (
+        (cubic, "the slope at 0", [(0.0, 1, 0.5), (0.0, 1, 0.6)]),
+        (line, r"the \w+ at [01]", [(0.0, 0, 0.0), (1.0, 0, 1.0), (0.0, 1, 2.0)]),
+        (line, "the second derivative at 0", [(0.0, 2, 1.0)]),
     ):
-        fit(space, x, y, None, (prescribed(0.0, 1, 0.5), prescribed(0.0, 1, 0.6)))
-    line = SplineSpace(2, 0.0, 1.0)
-    with pytest.raises(SplineError, match=r"the \w+ at [01] contradicts what else is prescribed"):
-        fit(
-            line,
-            x,
-            y,
-            None,
-            (prescribed(0.0, 0, 0.0), prescribed(1.0, 0, 1.0), prescribed(0.0, 1, 2.0)),
-        )
-    with pytest.raises(SplineError, match=wording.THE_SECOND_DERIVATIVE_AT_IS_ZERO):
-        fit(line, x, y, None, (prescribed(0.0, 2, 1.0),))
+        with pytest.raises(SplineError, match=f"^{told} contradicts what else is prescribed; "):
+            fit(space, x, y, tuple(Constraint(*condition) for condition in conditions))
 
 
 def test_nothing_is_extrapolated() -> None:
     x, y = noisy(12, 0.0, 1.0)
     fitted = fit(SplineSpace(4, 0.0, 1.0), x, y)
     for ask in (fitted.values, fitted.spread):
-        with pytest.raises(SplineError, match=wording.IS_OUTSIDE_THE_CURVE):
+        with pytest.raises(SplineError, match="1.1 is outside the curve, from 0 to 1; it is not"):
             ask(np.array([0.5, 1.1]))
-    with pytest.raises(SplineError, match="-0.5 is outside"):
-        fit(fitted.space, np.append(x, -0.5), np.append(y, 0.0))
 
 
 @pytest.mark.parametrize(
@@ -382,10 +336,3 @@ def test_nothing_is_extrapolated() -> None:
 def test_impossible_spaces_are_refused(arguments: tuple, text: str) -> None:  # type: ignore[type-arg]
     with pytest.raises(SplineError, match=text):
         SplineSpace(*arguments)
-
-
-def test_a_fit_keeps_what_it_was_made_of() -> None:
-    x, y = noisy(12, 0.0, 1.0)
-    fitted: SplineFit = fit(SplineSpace(4, 0.0, 1.0), x, y)
-    np.testing.assert_allclose(fitted.residuals, y - fitted.values(x))
-    assert fitted.sum_of_squares == pytest.approx(float((fitted.residuals**2).sum()))

@@ -19,7 +19,6 @@ from ballplate.uncertainty import uncertainties
 
 from .next_result import NextStep, Offered
 from .positions_read import groups_taken
-from .repeated_positions import without_redone
 
 # One-sided level of the bound of sigma where it comes from few degrees of freedom.
 CONFIDENCE = 0.95
@@ -53,7 +52,7 @@ def next_step(
 ) -> NextStep:
     """Judge the readings of an experiment's or pool's positions, and find the best next position.
 
-    The last readings of a position count. Uncertainties are as stated, or larger if residuals show
+    Uncertainties are as stated, or larger if residuals show
     it.
 
     :raises ExperimentError: a file is wrong, or names a position that is none.
@@ -160,11 +159,7 @@ def with_positions(experiment: Experiment, positions: Sequence[Position]) -> Exp
 
 def _observed(experiment: Experiment, sources: Sequence[Source]) -> ObservedReadings:
     return read_readings(
-        sources,
-        lay_out(experiment),
-        every_ball=False,
-        settings=experiment.readings,
-        thinned=without_redone,
+        sources, lay_out(experiment), every_ball=False, settings=experiment.readings
     )
 
 

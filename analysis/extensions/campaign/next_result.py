@@ -92,7 +92,6 @@ class NextStep(Result):
         lines = [
             f"{number_of(count, 'position')} read, last {self.read[-1]}; {self._answer()}",
             *self._missing(),
-            *self.observed.redone,
             *self._sigma_lines(),
         ]
         if planned is not None:
@@ -177,7 +176,6 @@ class NextStep(Result):
             "goal": str(self.goal),
             "read": self.read,
             "missing": dict(self.missing),
-            "redone": self.observed.redone,
             "target_met": self.is_met,
             "verdict": self._verdict(),
             "why_no_estimate": self.why or None,

@@ -12,8 +12,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.planning import RunSheet, Step
-from ballplate.simulator.experiment import Experiment, Position, lay_out
+from ballplate.planning import RunSheet, Step, position_of
+from ballplate.simulator.experiment import Experiment, lay_out
 from ballplate.simulator.geometry import ball_coordinates
 from ballplate.simulator.inputs import DURATION_UNITS, CsvWriter, in_one_line, refused
 from ballplate.simulator.machines import Array
@@ -42,8 +42,7 @@ class PlannedReading:
 
 def sequence(step: Step) -> Iterator[tuple[str, list[tuple[str, int, int]]]]:
     """Each probe of a step in order, with its balls: their names, indices and repeats."""
-    item = step.candidate.item
-    assert isinstance(item, Position)
+    item = position_of(step.candidate)
     for probe in step.probes:
         balls = [
             (name, int(k), group.repeats)
@@ -63,8 +62,7 @@ def planned_readings(sheet: RunSheet, experiment: Experiment) -> list[PlannedRea
     planned = []
     meant: dict[str, tuple[str, str, str]] = {}
     for step in sheet.steps:
-        item = step.candidate.item
-        assert isinstance(item, Position)
+        item = position_of(step.candidate)
         centres = ball_coordinates(item.pose, experiment.layouts[item.artefact])
         for probe, balls in () if step.done else sequence(step):
             for ball, k, repeats in balls:

@@ -7,12 +7,9 @@ from dataclasses import dataclass
 
 from ballplate.planning import (
     RunSheet,
-    Step,
-    ball_words,
-    change_over,
-    place_words,
     sheet_data,
     sheet_lines,
+    steps_of,
     summary,
 )
 from ballplate.presentation import Data, Result
@@ -20,7 +17,6 @@ from ballplate.simulator.experiment import Candidate, ChangeTimes, Experiment, i
 from ballplate.simulator.inputs import refused, to_python
 
 from .reading_lists import planned_readings, points_csv, points_dmis, template_csv
-from .sheet_head import offsets
 from .sheet_page import sheet_page
 
 
@@ -73,7 +69,7 @@ class Sheet(Result):
         if self.experiment.dimension == 2:
             text = "spheres in DMIS are for three dimensions; write a .csv file of points"
             raise refused(self.experiment.source, text, "machine.volume")
-        styli = dict(offsets(self.experiment))
+        styli = {name: probe.offset for name, probe in self.experiment.probes.items()}
         return points_dmis(readings, self.experiment.title, diameter, styli)
 
 
@@ -82,34 +78,15 @@ def sheet_of(experiment: Experiment) -> Sheet:
     tree = to_python(experiment.tree)
     positions = tree.get("positions", ()) if isinstance(tree, Mapping) else ()
     by_name = {str(settings["name"]): settings for settings in positions}
-    steps = []
-    before = None
-    pool, start = experiment.pool, 0.0
-    timed = (
-        {}
-        if pool is None
-        else {candidate.name: candidate.seconds for candidate in pool.candidates if candidate.drawn}
-    )
-    changes = ChangeTimes(0.0, 0.0) if pool is None else pool.changes
+    pool = experiment.pool
+    candidates = () if pool is None else pool.candidates
+    timed = {candidate.name: candidate.seconds for candidate in candidates if candidate.drawn}
+    sequence = []
     for position in experiment.positions:
         settings = in_lengths(by_name[position.name], position)
-        plane = settings.get("plane") if experiment.dimension == 3 else None
+        plane = (settings.get("plane") if experiment.dimension == 3 else None) or ""
         seconds = timed.get(position.name, 0.0)
-        candidate = Candidate(position.name, position, seconds, plane or "", "", True, settings)
-        here = candidate, position.probes
-        change, words = change_over(before, here, changes) if before else (0.0, "")
-        steps.append(
-            Step(
-                candidate,
-                place_words(candidate),
-                position.probes,
-                ball_words(candidate),
-                words,
-                change,
-                seconds,
-                start,
-                False,
-            )
-        )
-        before, start = here, start + change + seconds
-    return Sheet(experiment, RunSheet(tuple(steps), (), bool(timed), changes))
+        candidate = Candidate(position.name, position, seconds, plane, "", True, settings)
+        sequence.append((candidate, position.probes))
+    changes = ChangeTimes(0.0, 0.0) if pool is None else pool.changes
+    return Sheet(experiment, RunSheet(tuple(steps_of(sequence, changes)), (), bool(timed)))

@@ -2,18 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from importlib.metadata import version
 
-from ballplate.planning import RunSheet, Step, price, summary, times
+import numpy as np
+from ballplate.planning import RunSheet, Step, position_of, price, summary, times
 from ballplate.presentation import escaped
-from ballplate.simulator.experiment import Experiment, Position, lay_out, with_chosen
-from ballplate.simulator.geometry import BallLayout
+from ballplate.simulator.experiment import Experiment, lay_out, with_chosen
+from ballplate.simulator.geometry import ball_coordinates
 from ballplate.simulator.inputs import number_of
 
 from .reading_lists import sequence
-from .sheet_drawings import LONGEST_NAME, artefact_drawing, volume_drawing
-from .sheet_head import BLANKS, NOTES, known_fields, stylus_rows
-from .sheet_words import set_up_rows
+from .sheet_drawing import volume_drawing
+
+# To be written in by hand: at the head of a sheet, and in each position.
+BLANKS = ("machine", "operator", "date", "temperature, start", "temperature, end", "readings in")
+NOTES = ("begun", "ended", "temperature", "remarks")
+
+# A name longer than this is replaced by a number in the drawing.
+LONGEST_NAME = 9
 
 STYLE = """
 :root { color-scheme: light; }
@@ -33,12 +41,9 @@ table { border-collapse: collapse; width: 100%; }
 th { text-align: left; font-weight: normal; color: #555; }
 td, th { padding: 0.2em 0.8em 0.2em 0; border-bottom: 1px solid #ddd; vertical-align: top;
   overflow-wrap: break-word; }
-td.number, th.number { text-align: right; white-space: nowrap; }
-td.name { font-weight: bold; }
 th { white-space: nowrap; }
 tr { break-inside: avoid; }
 .wide { overflow-x: auto; }
-.pictures { display: flex; flex-wrap: wrap; gap: 1em; }
 figure { margin: 0; max-width: 100%; break-inside: avoid; }
 figcaption { color: #555; }
 svg { display: block; max-width: 100%; height: auto; }
@@ -76,34 +81,41 @@ ol.balls i { display: inline-block; width: 0.8em; height: 0.8em; border: 1px sol
 
 
 def sheet_page(sheet: RunSheet, experiment: Experiment, title: str) -> str:
-    """The run sheet as a page of HTML: the head, styli, artefacts, the volume, the order, and each
-    position.
+    """The run sheet as a page of HTML: the head, the order, styli, the volume, and each position.
 
     `experiment` has the artefacts and the volume.
     """
+    steps = list(enumerate(sheet.steps, 1))
+    timed = ["start", "min"] if sheet.timed else []
+    rows = [
+        [
+            str(number),
+            step.title,
+            ", ".join(step.probes),
+            str(step.readings),
+            *(times(step) if timed else ()),
+        ]
+        for number, step in steps
+    ]
     parts = [
         f"<h1>{escaped(title)}</h1>",
         f"<p>{escaped(summary(sheet))}</p>",
         _fields(dict.fromkeys(BLANKS, "") | known_fields(experiment)),
-        _order(sheet),
-        _styli(sheet, experiment),
-        _pictures(sheet, experiment),
+        "<h2>Order of positions</h2>",
+        _table(["", "position", "probes", "readings", *timed], rows),
+        "<h2>Styli</h2>",
+        _table(*_styli(sheet, experiment)),
+        _volume(sheet, experiment),
+        *(_step(number, step, sheet, experiment) for number, step in steps),
     ]
-    parts += [_step(number, step, sheet, experiment) for number, step in enumerate(sheet.steps, 1)]
     if sheet.calibration:
-        items = [
-            f"<td>{escaped(calibration.name)}</td><td>{price(calibration.seconds)}</td>"
-            for calibration in sheet.calibration
-        ]
-        rows = "".join(f"<tr>{item}</tr>" for item in items)
-        parts.append(
-            f"<h2>Calibration</h2><table><tr><th>item</th><th>price</th></tr>{rows}</table>"
-        )
+        rows = [[item.name, price(item.seconds)] for item in sheet.calibration]
+        parts += ["<h2>Calibration</h2>", _table(["item", "price"], rows)]
     return (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f"<title>{escaped(title)}</title><style>{STYLE}{_page_margins(title)}</style></head>\n"
-        "<body>\n" + "\n".join(part for part in parts if part) + "\n</body></html>\n"
+        "<body>\n" + "\n".join(parts) + "\n</body></html>\n"
     )
 
 
@@ -132,94 +144,55 @@ def _fields(fields: dict[str, str]) -> str:
     return f'<div class="fields">{"".join(cells)}</div>'
 
 
-def _order(sheet: RunSheet) -> str:
-    heads = ["", "position", "probes", "readings", *(["start", "min"] if sheet.timed else [])]
+def known_fields(experiment: Experiment) -> dict[str, str]:
+    """Return the fields with known values."""
+    machine, volume = experiment.machine, experiment.machine.volume
+    size = " x ".join(f"{1e3 * length:.6g}" for length in volume.size)
+    noise = sorted({f"{1e6 * deviation:.4g}" for deviation in machine.repeatability}, key=float)
+    variant = f", {experiment.name}" if experiment.name else ""
+    return {
+        "file": f"{experiment.source.name}{variant}",
+        "written by": f"ballplate {version('ballplate')}",
+        "volume": f"{size} mm",
+        "repeatability": f"{' to '.join(dict.fromkeys((noise[0], noise[-1])))} µm",
+    }
+
+
+def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    lines = "".join(
+        f"<tr>{''.join(f'<td>{escaped(cell)}</td>' for cell in row)}</tr>" for row in rows
+    )
+    titles = "".join(f'<th scope="col">{head}</th>' for head in heads)
+    return f'<div class="wide"><table><tr>{titles}</tr>{lines}</table></div>'
+
+
+def _styli(sheet: RunSheet, experiment: Experiment) -> tuple[list[str], list[list[str]]]:
+    """Headings and rows of the probes that a sheet uses: offsets, the angles A and B of an
+    articulating head, stated or to fill in, and the diameters to fill in.
+    """
+    used = {probe for step in sheet.steps for probe in step.probes}
     rows = []
-    for number, step in enumerate(sheet.steps, 1):
-        description = f"<br>{escaped(step.description)}" if step.description else ""
-        cells = [
-            f'<td class="number">{number}</td>',
-            f"<td><b>{escaped(step.name)}</b>{description}</td>",
-            f"<td>{escaped(', '.join(step.probes))}</td>",
-            f'<td class="number">{step.readings}</td>',
-        ]
-        if sheet.timed:
-            cells += [f'<td class="number">{text}</td>' for text in times(step)]
-        rows.append(f"<tr>{''.join(cells)}</tr>")
-    return f"<h2>Order of positions</h2>{_table(heads, rows, {0, 3, 4, 5})}"
+    for probe in (probe for name, probe in experiment.probes.items() if name in used):
+        lengths = [f"{1e3 * length:.6g}" for length in probe.offset]
+        angles = [f"{np.degrees(angle):.4g}°" for angle in probe.angles or ()]
+        rows.append([probe.name, *lengths, ", ".join(angles), ""])
+    axes = [f"{axis}, mm" for axis in "xyz"[: experiment.dimension]]
+    return ["probe", *axes, "A, B of the head", "diameter of the tip"], rows
 
 
-def _table(heads: list[str], rows: list[str], numbers: set[int]) -> str:
-    cells = [
-        f'<th scope="col" class="number">{head}</th>'
-        if k in numbers
-        else f'<th scope="col">{head}</th>'
-        for k, head in enumerate(heads)
-    ]
-    return f'<div class="wide"><table><tr>{"".join(cells)}</tr>{"".join(rows)}</table></div>'
-
-
-def _styli(sheet: RunSheet, experiment: Experiment) -> str:
-    heads, *styli = stylus_rows(sheet, experiment)
-    blanks = ["diameter of the tip"]
-    mounting = ""
-    if "A" not in heads:
-        blanks = ["A, B of the head", *blanks]
-        mounting = " The head's own angles depend on how it is mounted."
-    numbers = set(range(1, len(heads)))
-    rows = [
-        f'<tr><td class="name">{escaped(row[0])}</td>'
-        + "".join(f'<td class="number">{text}</td>' for text in row[1:])
-        + "<td></td>" * len(blanks)
-        + "</tr>"
-        for row in styli
-    ]
-    table = f"<h2>Styli</h2>{_table([*heads, *blanks], rows, numbers)}"
-    of_axes = "the offset of the tip from the reference point, the angle of its direction from"
-    if experiment.dimension == 2:
-        return table
-    return (
-        f"{table}<p><small>For each probe {of_axes} straight down, and from +x towards +y seen from"
-        f" above.{mounting}</small></p>"
-    )
-
-
-def _pictures(sheet: RunSheet, experiment: Experiment) -> str:
-    """The artefacts that are read, and the volume."""
-    figures = []
-    todo = [step for step in sheet.steps if not step.done]
-    for name in dict.fromkeys(step.artefact for step in todo):
-        first_step = next(step for step in todo if step.artefact == name)
-        order = [k for _, balls in list(sequence(first_step))[:1] for _, k, _ in balls]
-        figures.append(
-            f"<figure>{artefact_drawing(name, experiment.layouts[name], order)}"
-            f"<figcaption>{escaped(name)}, seen from the side that its z points to; the line is the"
-            f" order of reading, from the dark ball on{_numbered(experiment.layouts[name])}"
-            "</figcaption></figure>"
-        )
-    pictures = (
-        f'<h2>Artefacts</h2><div class="pictures">{"".join(figures)}</div>' if figures else ""
-    )
-    positions = [picture for picture in sheet.written if isinstance(picture.item, Position)]
-    if not positions:
-        return pictures
+def _volume(sheet: RunSheet, experiment: Experiment) -> str:
+    """The positions in the volume."""
     # Where things stand does not depend on what disturbs their readings.
-    design = lay_out(with_chosen(replace(experiment, influences=()), positions))
+    design = lay_out(with_chosen(replace(experiment, influences=()), sheet.written))
     numbers = {step.name: str(number) for number, step in enumerate(sheet.steps, 1)}
     names = {
         name: name if len(name) <= LONGEST_NAME else number for name, number in numbers.items()
     }
     more = "; a number replaces a long name" if set(names.values()) != set(names) else ""
     return (
-        f"{pictures}<h2>Positions in the volume</h2><figure>{volume_drawing(design, names)}"
+        f"<h2>Positions in the volume</h2><figure>{volume_drawing(design, names)}"
         f"<figcaption>the dot is the first ball of each position{more}</figcaption></figure>"
     )
-
-
-def _numbered(layout: BallLayout) -> str:
-    """Return the remark on numbers in place of long ball names."""
-    is_long = max(map(len, layout.names)) > LONGEST_NAME
-    return "; numbers follow the artefact's list of balls" if is_long else ""
 
 
 def _step(number: int, step: Step, sheet: RunSheet, experiment: Experiment) -> str:
@@ -232,7 +205,7 @@ def _step(number: int, step: Step, sheet: RunSheet, experiment: Experiment) -> s
         if step.change
         else ""
     )
-    rows = set_up_rows(step, experiment)
+    rows = _set_up(step, experiment)
     items = "".join(f"<dt>{key}</dt><dd>{escaped(value)}</dd>" for key, value in rows)
     kind = "step done" if step.done else "step"
     body = ""
@@ -263,3 +236,23 @@ def _readings(step: Step) -> str:
             f'<ol class="balls" style="--width: {0.6 * longest + 1.5:.1f}em">{items}</ol>'
         )
     return "".join(parts)
+
+
+def _set_up(step: Step, experiment: Experiment) -> list[tuple[str, str]]:
+    """Return the set-up of a position: the artefact if there are several, its location, machine
+    co-ordinates of its first and last ball, and the balls to read.
+    """
+    item = position_of(step.candidate)
+    layout = experiment.layouts[item.artefact]
+    centres = 1e3 * ball_coordinates(item.pose, layout)
+    places = []
+    for k in dict.fromkeys((0, len(layout.names) - 1)):
+        numbers = ", ".join(f"{value + 0.0:.6g}" for value in np.round(centres[k], 3))
+        places.append(f"ball {layout.names[k]} is at ({numbers}) mm")
+    rows = [
+        ("artefact", step.artefact),
+        ("set up", step.place),
+        ("so that", " and ".join(places)),
+        ("read", f"{step.balls}; {number_of(step.readings, 'reading')}"),
+    ]
+    return rows if len(experiment.artefacts) > 1 else rows[1:]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from argparse import Action, ArgumentParser, ArgumentTypeError, Namespace
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from pathlib import Path
 from typing import Any
 
@@ -20,13 +20,13 @@ from ballplate.cli import (
     write_noted,
 )
 
-ENDINGS = (".html", ".csv", ".xml", ".json")
+ENDINGS = (".html", ".csv", ".xml")
 
 DESCRIPTION = (
     "Fit readings and state the co-ordinates of a plate's balls in the plate's own axes with their"
     " full covariance, and distances with U: as a page (.html), as tables that calibration items"
-    " read (.csv, with the covariance in a second file), as a digital calibration certificate"
-    " (.xml) or as an archive of the GUM Tree Calculator (.json). Lengths without a calibrated"
+    " read (.csv, with the covariance in a second file) or as a digital calibration"
+    " certificate (.xml). Lengths without a calibrated"
     " source of scale are refused. The exit status is 0 if the estimate converged, the rank is as"
     " expected and no lack of fit is beyond the limit, otherwise 1."
 )
@@ -46,16 +46,6 @@ class _Written(OutputAction):
         namespace.outputs = tuple(other_outputs)
 
 
-class _Stated(Action):
-    """Texts by keys, each given with an option of its own."""
-
-    def __call__(
-        self, parser: ArgumentParser, namespace: Namespace, values: Any, option_string: Any = None
-    ) -> None:
-        key, text = values
-        setattr(namespace, self.dest, {**getattr(namespace, self.dest), key: text})
-
-
 def add_options(parser: ArgumentParser) -> None:
     add_readings(parser)
     parser.add_argument(
@@ -64,7 +54,7 @@ def add_options(parser: ArgumentParser) -> None:
         action=_Written,
         metavar="FILE",
         type=_output,
-        help="write the certificate: .html, .csv, .xml (DCC) or .json (GTC); default: print it",
+        help="write the certificate: .html, .csv or .xml (DCC); default: print it",
     )
     parser.add_argument(
         "--plate", metavar="NAME", help="the plate; optional if there is exactly one"
@@ -88,10 +78,10 @@ def add_options(parser: ArgumentParser) -> None:
     )
     parser.add_argument(
         "--about",
-        action=_Stated,
+        action="append",
         metavar="KEY=TEXT",
         type=_stated,
-        default={},
+        default=[],
         help=(
             "what else is to be stated, once for each key: identifier, date, country, laboratory,"
             " e-mail, city, person, customer, manufacturer, serial number; a DCC needs date"
@@ -131,7 +121,7 @@ def run(options: Namespace) -> int:
     if not result.converged:
         return 1
     try:
-        asked = options.plate, options.datum, options.coverage_factor, options.about
+        asked = options.plate, options.datum, options.coverage_factor, dict(options.about)
         result_certificate = plate_certificate(result, *asked)
         texts = {} if options.output is None else result_certificate.texts(options.output)
     except ValueError as error:

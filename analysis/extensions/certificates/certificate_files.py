@@ -27,9 +27,10 @@ from ballplate.simulator.design import (
     State,
     far_from_drawing,
 )
-from ballplate.simulator.experiment import Experiment, doubt_of_table, exact_contradictions
+from ballplate.simulator.experiment import Experiment
 from ballplate.simulator.inputs import (
     MOST_MESSAGES,
+    PARSERS,
     SMALLEST,
     CsvWriter,
     ExperimentError,
@@ -42,9 +43,6 @@ from ballplate.simulator.inputs import (
     hint,
     length_text,
     listing,
-    parse_angle,
-    parse_length,
-    parse_ratio,
     read_table,
     read_text,
     refused,
@@ -54,7 +52,6 @@ from ballplate.simulator.readings import Simulated
 
 COLUMNS = ("item", "first", "second", "value")
 AXES = "xyz"
-PARSERS = {"m": parse_length, "rad": parse_angle, "1": parse_ratio}
 UNIT_NAMES = {"rad": "rad", "1": "m/m"}
 
 
@@ -197,8 +194,7 @@ def ensure_certified(experiment: Experiment) -> None:
 
 
 def read_certificate(path: Path | GivenText, experiment: Experiment) -> Experiment:
-    """An experiment with the certificate values of a file instead of its own, and further `doubts`
-    where tables of stars are not those of its probes.
+    """An experiment with the certificate values of a file instead of its own.
 
     :raises ExperimentError: a wrong table; a value that the experiment does not have, or has
         already, or that is far from the drawing; values that are missing, or exact and
@@ -257,36 +253,11 @@ def read_certificate(path: Path | GivenText, experiment: Experiment) -> Experime
     if problems:
         raise ExperimentError(sorted(problems)[:MOST_MESSAGES])
     changed = with_values(experiment, values)
-    wrong = [Message(str(path), 1, 1, "", text) for text in _wrong_together(changed)]
+    doubts = (item.doubt(changed.layout_of(item)) for item in changed.calibration)
+    wrong = [Message(str(path), 1, 1, "", text) for text in doubts if text]
     if wrong:
         raise ExperimentError(wrong)
-    return replace(
-        changed, doubts=(*experiment.doubts, *_doubts_of_stars(path, changed, experiment))
-    )
-
-
-def _wrong_together(experiment: Experiment) -> Iterator[str]:
-    """Faults of certified values of which each is possible."""
-    for item in experiment.calibration:
-        if text := item.doubt(experiment.layout_of(item)):
-            yield text
-    plates = [name for name, item in experiment.artefacts.items() if item.role != "length_standard"]
-    calibrations = dict(enumerate(experiment.calibration))
-    for _, text in exact_contradictions(calibrations, plates, experiment.layouts):
-        yield text
-
-
-def _doubts_of_stars(
-    path: Path | GivenText, changed_experiment: Experiment, experiment: Experiment
-) -> Iterator[str]:
-    """What is unlikely of stars whose values are those of a file, where it was not before."""
-    for k, (star, before) in enumerate(
-        zip(changed_experiment.stars, experiment.stars, strict=True)
-    ):
-        offsets = np.array([changed_experiment.probes[name].offset for name in star.probes])
-        text = doubt_of_table(star, offsets)
-        if text and text != doubt_of_table(before, offsets):
-            yield f"{path}: {format_path(('stars', k))}: {text}"
+    return changed
 
 
 def _unknown(row: FileRow, values_known: list[CertifiedValue]) -> str:

@@ -3,16 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from html import escape
 
 from ballplate.presentation import escaped
 
-from .certificate_csv import coordinate_names
 from .certified_balls import NO_ACCREDITATION, CertifiedBalls
-
-# Of more co-ordinates the page refers to the other forms for their covariance.
-MOST_IN_TABLE = 75
-
 
 STYLE = """
 :root { color-scheme: light; }
@@ -36,7 +30,6 @@ tr { break-inside: avoid; }
 thead { display: table-header-group; }
 .wide { overflow-x: auto; }
 .small { color: #555; font-size: 0.9em; }
-pre { font-size: 11px; overflow-x: auto; border: 1px solid #ddd; padding: 0.5em; margin: 0.4em 0; }
 @media (max-width: 40em) {
   dl { display: block; }
   dd { margin: 0 0 0.5em; }
@@ -47,15 +40,12 @@ pre { font-size: 11px; overflow-x: auto; border: 1px solid #ddd; padding: 0.5em;
   body { margin: 0; padding: 0; max-width: none; font-size: 10pt; }
   .wide { overflow: visible; }
   td, th { padding-left: 0.8em; }
-  pre { font-size: 4.2pt; white-space: pre-wrap; overflow: visible; }
 }
 """
 
 
 def certificate_page(certificate: CertifiedBalls) -> str:
-    """The certificate as a page of HTML: statement, facts, remarks, co-ordinates, distances,
-    covariance.
-    """
+    """The certificate as a page of HTML: statement, facts, remarks, co-ordinates, distances."""
     title = f"Ball co-ordinates of {certificate.artefact}"
     remarks = "".join(f"<p>{escaped(text)}</p>" for text in certificate.remarks)
     facts = "".join(
@@ -71,8 +61,6 @@ def certificate_page(certificate: CertifiedBalls) -> str:
         f"<h2>Co-ordinates, U = {k} u</h2>{_table(certificate.coordinate_table(), 1)}",
         f"<h2>Distances, U = {k} u</h2>{_table(certificate.distance_table(), 2)}",
         f'<p class="small">{_of_distances(certificate)}</p>',
-        "<h2>Covariance of the co-ordinates, µm²</h2>",
-        _covariance(certificate),
     ]
     return (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
@@ -103,23 +91,10 @@ def _table(rows: Sequence[Sequence[str]], names: int) -> str:
 
 def _of_distances(certificate: CertifiedBalls) -> str:
     count = len(certificate.names)
-    note = "Any distance and its uncertainty follow from co-ordinates and covariance."
+    note = (
+        "Any distance and its uncertainty follow from co-ordinates and their covariance, which the"
+        " forms .csv and .xml of this certificate have."
+    )
     if len(certificate.distances) == count * (count - 1) // 2:
         return note
-    return f"Some of the {count * (count - 1) // 2} distances, between balls far apart. {note}"
-
-
-def _covariance(certificate: CertifiedBalls) -> str:
-    names = coordinate_names(certificate)
-    if len(names) > MOST_IN_TABLE:
-        return (
-            f"<p>The covariance of {len(names)} co-ordinates is part of the forms .csv, .xml and"
-            " .json of this certificate.</p>"
-        )
-    rows = [
-        f"{name},{','.join(f'{value:.4g}' for value in row)}"
-        for name, row in zip(names, (1e12 * certificate.covariance).tolist(), strict=True)
-    ]
-    text = "\n".join([f"covariance_um2,{','.join(names)}", *rows])
-    note = "To four digits; the forms .csv, .xml and .json of this certificate have all."
-    return f'<pre>{escape(text)}</pre><p class="small">{note}</p>'
+    return f"Some of the {count * (count - 1) // 2} distances. {note}"

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +26,6 @@ from ballplate.simulator.inputs import (
     matrix_problems,
     metres_or_radians,
     shorten,
-    unit_of_area,
 )
 from ballplate.simulator.machines import Array
 
@@ -70,9 +69,6 @@ class DigitalValue:
     uncertainty: float
     factor: float
     problem: str = ""
-
-    # Labels of the list that a value stands in, where there are more or fewer than values.
-    unmatched: tuple[str, ...] = ()
 
     @property
     def is_length(self) -> bool:
@@ -166,14 +162,6 @@ def _result(element: Element, temperatures: tuple[tuple[str, float], ...]) -> Di
     for part in _parts(data, ()) if data is not None else ():
         block = part.block
         values = list(_values(block, part.contexts, part.labels))
-        if part.is_relative:
-            # What is stated in the unit of the values as well says the same, and of which kind.
-            values = [
-                replace(value, problem=RELATIVE)
-                if math.isnan(value.uncertainty) and not value.problem
-                else value
-                for value in values
-            ]
         start = len(lengths)
         lengths += values
         matrix = _matrix(block, len(values)) if _is_length(block) else None
@@ -192,14 +180,13 @@ def _result(element: Element, temperatures: tuple[tuple[str, float], ...]) -> Di
 
 @dataclass(frozen=True)
 class _Part:
-    """A value or a list of values, with what those above it are called; whether its quantity has a
-    relative uncertainty; and lists of texts that stand beside it, which may be labels.
+    """A value or a list of values, with what those above it are called, and lists of texts that
+    stand beside it, which may be labels.
     """
 
     block: Element
     contexts: tuple[str, ...]
     labels: tuple[tuple[str, ...], ...] = ()
-    is_relative: bool = False
 
 
 def _parts(
@@ -218,17 +205,9 @@ def _parts(
                 beside = (*labels, *map(tuple, texts))
             types = child.attributes.get("refType", "").split()
             inner = list(_parts(child, (*contexts, *_names(child), *types), beside))
-            if child.first("relativeUncertainty") is not None:
-                inner = [replace(part, is_relative=True) for part in inner]
             # All parts of a hybrid are one quantity in several units.
             in_metres = [inner_part for inner_part in inner if _is_length(inner_part.block)]
             yield from (in_metres or inner)[:1] if child.name == "hybrid" else inner
-
-
-RELATIVE = (
-    "has only a relative uncertainty, which may be standard or expanded;"
-    " state standard uncertainties in a CSV file"
-)
 
 
 def _units(block: Element) -> list[str]:
@@ -273,11 +252,6 @@ def _values(
     labels = block.text_at(f"label{LIST}").split()
     units = _units(block)
     uncertainty = _uncertainty(block)
-    columns = [labels] if labels else [list(neighbour) for neighbour in beside if neighbour]
-    unmatched: tuple[str, ...] = ()
-    if columns and len(values) not in map(len, columns):
-        alike = [column for column in columns if len(column) == len(columns[-1])]
-        unmatched = tuple(map(" ".join, zip(*alike, strict=True)))
     for k, value in enumerate(values[: MOST_NAMES + 1]):
         labels_of_value: tuple[str, ...] = (labels[k],) if len(labels) == len(values) else ()
         if not labels:
@@ -305,8 +279,7 @@ def _values(
                 [amounts or ""],
                 [factors] if factors else [],
             )
-        length = _value(block.mark, labels_of_value, contexts, value, own_unit, mine)
-        yield replace(length, unmatched=unmatched)
+        yield _value(block.mark, labels_of_value, contexts, value, own_unit, mine)
 
 
 def _one_of(texts: list[str], k: int, count: int) -> str | None:
@@ -392,7 +365,7 @@ def _matrix(block: Element, count: int) -> NamedMatrix | None:
         raise region.mark.refused(text)
     columns = [child for child in region.walk() if child.name.removesuffix(LIST) == "column"]
     values, rounding = np.zeros((count, count)), np.zeros((count, count))
-    marks, factors = [], set[float]()
+    marks = []
     for k, column in enumerate(columns):
         marks.append(column.mark)
         numbers, units = list[str](), list[str]()
@@ -411,14 +384,12 @@ def _matrix(block: Element, count: int) -> NamedMatrix | None:
                 factor = float(length_factor(_one_of(units, j, count) or "", 2))
             except QuantityError as error:
                 raise column.mark.refused(f"covariance: {error}") from None
-            factors.add(factor)
             values[j, k], rounding[j, k] = _plain(number) * factor, half_digit(number) * factor
             if not math.isfinite(values[j, k]):
                 text = f'covariance: "{shorten(number)}" is not a number'
                 raise column.mark.refused(text)
     names = tuple(f"value {k + 1}" for k in range(count))
-    unit = unit_of_area(factors.pop()) if len(factors) == 1 else "um"
-    matrix = NamedMatrix(names, values, rounding, False, tuple(marks), unit)
+    matrix = NamedMatrix(names, values, rounding, False, tuple(marks))
     wrong = matrix_problems(matrix)
     if wrong:
         raise ExperimentError(wrong)

@@ -47,7 +47,7 @@ def read_digital(
     error added.
     """
     # Loaded with a parser of XML, which few experiments need.
-    from .digital_certificates import RELATIVE, matrix_of, read_digital_certificate
+    from .digital_certificates import matrix_of, read_digital_certificate
 
     problems, place = references.problems, (*steps, "values")
     try:
@@ -61,17 +61,6 @@ def read_digital(
         return None
     result, matches = found
     before, values, sources = len(problems.messages), [], []
-    forms = _forms(wanted)
-    for length in result.lengths:
-        is_asked = settings.quantity in (None, *length.names, *length.contexts)
-        is_wanted = is_asked and any(_words(label) in forms for label in length.unmatched)
-        if is_wanted and length.is_length:
-            labels = len(length.unmatched)
-            count = sum(other.mark == length.mark for other in result.lengths)
-            text = " ".join(filter(None, (str(count), _kind(length), "value")))
-            text += f"{'s' * (count != 1)} for {labels} label{'s' * (labels != 1)}"
-            problems.add_at(length.mark, place, f"{text}; state one value for each label")
-            return None
     for k, names in enumerate(wanted):
         called = value_name(names, is_pair)
         measured = _measured(result, matches[k])
@@ -88,9 +77,7 @@ def read_digital(
             text = f"{called} has no measured value, only a nominal one; write quantity: {label}"
             problems.add_at(value.mark, place, f"{text} if nominal values are meant")
             return None
-        # Who states the uncertainty needs none of the file.
-        is_stated = value.problem == RELATIVE and settings.standard_uncertainty is not None
-        if value.problem and not is_stated:
+        if value.problem:
             problems.add_at(value.mark, place, f"{called} {value.problem}")
         values.append(value)
         sources.append(source)

@@ -7,11 +7,10 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from itertools import combinations
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 from ballplate.presentation import write_file
-from ballplate.results import MappedFit, data_of
+from ballplate.results import Fit, data_of
 from ballplate.simulator.computing import blank, single_threaded
 from ballplate.simulator.design import TemperaturesSettings
 from ballplate.simulator.estimation import MICROMETRE, BallPlaces, Linearisation, displacements
@@ -27,11 +26,9 @@ from .certificate_page import certificate_page
 from .certified_balls import ABOUT, CertifiedBalls, PlateDistance
 from .datum import Datum, chosen_datum, in_datum, relative_to
 from .digital_form import digital_certificate
-from .uncertain_archive import gtc_archive
 
-# Of so many balls all distances are stated, of more those between a few that are far apart.
+# Of so many balls all distances are stated, of more those between corners, or the first ones.
 MOST_BALLS_FOR_ALL_DISTANCES = 16
-SOME_BALLS = 6
 # What is smaller, in metres, is rounding.
 ROUNDING = 1e-14
 
@@ -46,7 +43,6 @@ FORMS: dict[str, Callable[[CertifiedBalls, Path], dict[Path, str]]] = {
     ".html": lambda certificate, path: {path: certificate_page(certificate)},
     ".csv": _tables,
     ".xml": lambda certificate, path: {path: digital_certificate(certificate)},
-    ".json": lambda certificate, path: {path: gtc_archive(certificate)},
 }
 
 
@@ -64,8 +60,8 @@ class PlateCertificate(CertifiedBalls):
 
     def texts(self, path: str | Path) -> dict[Path, str]:
         """The certificate as the ending of a name says: a page (.html), tables (.csv, with the
-        covariance in a second one beside it), a digital calibration certificate (.xml) or a GTC
-        archive (.json); by the names of files.
+        covariance in a second one beside it) or a digital calibration certificate (.xml); by the
+        names of files.
 
         :raises ValueError: another ending, or a digital certificate without what it has to state.
         """
@@ -87,22 +83,9 @@ class PlateCertificate(CertifiedBalls):
             write_file(name, text.encode())
 
 
-class CertifiedFit(MappedFit, Protocol):
-    """What a certificate is made of: a fit of an experiment, see `Fit`."""
-
-    @property
-    def title(self) -> str: ...
-    @property
-    def without_scatter(self) -> bool: ...
-    @property
-    def warnings(self) -> tuple[str, ...]: ...
-    @property
-    def complaint(self) -> str: ...
-
-
 @single_threaded
 def plate_certificate(
-    fit: CertifiedFit,
+    fit: Fit,
     plate: str | None = None,
     datum: Sequence[str] = (),
     coverage_factor: float | None = None,
@@ -140,7 +123,7 @@ def plate_certificate(
     coordinates, root, is_open = _in_axes(linearisation, layout, index, chosen)
     determined = np.flatnonzero(~is_open.any(axis=1))
     if not len(determined) or is_open[_datum_balls(chosen)].any():
-        distances = _distances(linearisation, index, layout.names, fit.sigma)
+        distances = _distances(linearisation, layout, index, np.arange(len(index)), fit.sigma)
         text = _undetermined(is_open, layout, distances)
         raise refused(experiment.source, text, "calibration")
     coordinates, root = coordinates[determined], fit.sigma * root[determined]
@@ -161,7 +144,7 @@ def plate_certificate(
         names,
         coordinates,
         flat @ flat.T,
-        _distances(linearisation, index[determined], names, fit.sigma),
+        _distances(linearisation, layout, index, determined, fit.sigma),
         tuple(layout.names[k] for k in np.flatnonzero(is_open.any(axis=1))),
         carriers,
         float(np.linalg.norm(by_scale)),
@@ -175,7 +158,7 @@ def plate_certificate(
     )
 
 
-def _fingerprint(fit: CertifiedFit, experiment: Experiment, plate: str, datum: str) -> str:
+def _fingerprint(fit: Fit, experiment: Experiment, plate: str, datum: str) -> str:
     """SHA-256 of what a certificate comes from."""
     contents = [
         data_of(fit.observed).sha256,
@@ -284,41 +267,31 @@ def _temperature(experiment: Experiment, plate: str) -> tuple[float | None, str]
 
 
 def _distances(
-    linearisation: Linearisation, index: Integers, names: tuple[str, ...], sigma: float
+    linearisation: Linearisation,
+    layout: BallLayout,
+    index: Integers,
+    chosen: Integers,
+    sigma: float,
 ) -> tuple[PlateDistance, ...]:
-    moved = displacements(linearisation, BallPlaces(index))
-    some = list(range(len(names)))
+    """Distances between the `chosen` balls of a layout, whose balls in the design are `index`."""
+    moved = displacements(linearisation, BallPlaces(index[chosen]))
+    some = np.arange(len(chosen))
     if len(some) > MOST_BALLS_FOR_ALL_DISTANCES:
-        some = _far_apart(moved.drawn)
+        corners = np.flatnonzero(np.isin(chosen, layout.corner_set))
+        some = corners if len(corners) > 1 else some[:MOST_BALLS_FOR_ALL_DISTANCES]
     pairs = np.array(list(combinations(some, 2)), np.int64).reshape(-1, 2)
     lengths_moved = pairs_of(moved, pairs)
     u = np.where(lengths_moved.is_open, np.nan, sigma * lengths_moved.uncertainties)
     return tuple(
-        PlateDistance((names[i], names[j]), length, uncertainty)
+        PlateDistance((layout.names[chosen[i]], layout.names[chosen[j]]), length, uncertainty)
         for (i, j), length, uncertainty in zip(
             pairs.tolist(), lengths_moved.lengths.tolist(), u.tolist(), strict=True
         )
     )
 
 
-def _far_apart(places: Array) -> list[int]:
-    """Some balls, each the one farthest from those before, in the plate's order."""
-    centred = places - places.mean(axis=0)
-    chosen = [_first_farthest((centred**2).sum(axis=1))]
-    nearest = np.full(len(places), np.inf)
-    while len(chosen) < SOME_BALLS:
-        nearest = np.minimum(nearest, ((places - places[chosen[-1]]) ** 2).sum(axis=1))
-        chosen.append(_first_farthest(nearest))
-    return sorted(set(chosen))
-
-
-def _first_farthest(squares: Array) -> int:
-    # Of equal ones the first, whatever rounding makes of them.
-    return int(np.flatnonzero(squares >= squares.max() * (1.0 - 1e-9))[0])
-
-
 def _remarks(
-    fit: CertifiedFit, experiment: Experiment, plate: str, carriers: tuple[str, ...]
+    fit: Fit, experiment: Experiment, plate: str, carriers: tuple[str, ...]
 ) -> tuple[str, ...]:
     """What a reader has to know of the fit and of the plate."""
     remarks = [*fit.warnings, *filter(None, [fit.complaint])]

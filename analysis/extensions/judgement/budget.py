@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from ballplate.presentation import Data, MainTable, Result, aligned, number, picked
-from ballplate.results import Fit, Grouping, few_degrees_of_freedom
+from ballplate.results import Fit, few_degrees_of_freedom
 from ballplate.simulator.computing import comparable, evenly_spread, single_threaded
 from ballplate.simulator.estimation import (
     Coordinates,
@@ -23,6 +23,7 @@ from ballplate.simulator.estimation import (
 from ballplate.simulator.experiment import Experiment, lay_out
 from ballplate.uncertainty import QUANTITIES, expansion, functions_of
 
+from .observation_groups import Grouping
 from .source_sums import SourceSums, source_sums, sources_of
 
 # Evaluation points of which all distances are looked at; of more, some are chosen evenly.

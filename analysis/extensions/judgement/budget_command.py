@@ -14,7 +14,8 @@ from ballplate.cli import (
     single,
     warn_of,
 )
-from ballplate.results import GROUPINGS
+
+from .observation_groups import GROUPINGS
 
 DESCRIPTION = (
     "Compute what each source of uncertainty contributes to U4, U6, the body diagonals and the"

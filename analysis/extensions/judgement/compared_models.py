@@ -1,13 +1,12 @@
 """Comparison of error models on an experiment's readings: the smallest sufficient one.
 
-Kinematic models with polynomials of increasing degree, and empirical ones, are compared by tests
-of the sum of squares that a larger model explains, as NPL Report CISE 15/98, section 5.3, compares
-two.
+Kinematic models with more and more coefficients, empirical ones and the file's own are fitted.
+Models of one kind are compared by tests of the sum of squares that a larger one explains, as NPL
+Report CISE 15/98, section 5.3, compares two, and those of several kinds by Schwarz's criterion.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -23,167 +22,81 @@ from ballplate.simulator.design import Design, State
 from ballplate.simulator.estimation import Linearisation, corrected_points, estimate, linearised_fit
 from ballplate.simulator.experiment import Experiment
 from ballplate.simulator.inputs import refused
-from ballplate.simulator.machines import Array, ErrorModel, KinematicSettings
+from ballplate.simulator.machines import Array
 from ballplate.simulator.readings import ObservedReadings
 from ballplate.uncertainty import uncertainties
 
-from .compared_models_result import ComparedModels, LengthChange, Rung
+from .compared_models_result import FALSE_STEP, Beaten, ComparedModels, Rung
 from .lack_of_fit import PureError, chance_of, pure_error
-from .nested import nested_sums
-from .rung_choice import (
-    ROUNDING,
-    Beaten,
-    Comparison,
-    FittedSum,
-    PolynomialGrid,
-    first_adequate,
-    limits_reached,
-    richer,
-)
-from .rungs import (
-    EMPIRICAL,
-    MOST_COEFFICIENTS,
-    POOREST,
-    LadderModel,
-    deficiency,
-    empirical_rung,
-    kinematic_rung,
-    own_rung,
-    refuse_priors,
-    with_model,
-)
+from .rungs import MOST_COEFFICIENTS, LadderModel, determined_rungs, rung_of_file, with_model
 
 NO_RICHER = (
-    "this design determines no model larger than the recommended one: its sufficiency is untested"
+    "this design determines no larger model of the recommended kind: its sufficiency is untested"
+)
+
+NEEDS_MORE = (
+    "the readings need as many coefficients as were tried, and may need more, for example for an"
+    " error that repeats over short distances"
 )
 
 # Chance below which residuals do not come from the scatter of the readings.
 MISFIT = 1e-3
 
+# BIC above that of a model of another kind, from which on the other is better.
+CLEARLY_WORSE = 10.0
+
+# Sums of squares for each degree of freedom below this are rounding.
+ROUNDING = 1e-12
+
 
 @dataclass(frozen=True, eq=False)
 class RungFit:
-    """An estimate with one model of the ladder: its sum of squares and its state."""
+    """An error model, the linearisation at its estimate, S^2 and the degrees of freedom left."""
 
-    fitted: FittedSum
+    model: LadderModel
     at: Linearisation
+    sum_of_squares: float
+    degrees_of_freedom: int
 
-    @property
-    def model(self) -> LadderModel:
-        return self.fitted.model
-
-    def sigma(self, is_given: bool) -> float:
-        """Factor of the stated uncertainties."""
-        variance = self.fitted.sum_of_squares / self.fitted.degrees_of_freedom
-        return 1.0 if is_given else float(np.sqrt(variance))
-
-
-@dataclass(frozen=True, eq=False)
-class Climb:
-    """The models that a design determines, with their S^2, and the chosen one.
-
-    `beyond` describes models that the design leaves undetermined, `most` is the largest number of
-    coefficients tried.
-    """
-
-    grid: PolynomialGrid
-    every: list[FittedSum]
-    chosen: FittedSum
-    beaten: Beaten
-    beyond: tuple[str, ...]
-    most: int
-
-    @property
-    def richest(self) -> FittedSum:
-        """That with the most parameters."""
-        return max(self.every, key=lambda fitted: fitted.model.count)
-
-    def unconfirmed(self, model: LadderModel) -> tuple[str, bool]:
-        """Reason why a model's number of coefficients is unconfirmed, possibly empty, and whether
-        it is a lack of readings.
+    def bic(self, is_given: bool) -> float:
+        """Schwarz's criterion of a normal likelihood with all parameters, sigma among them unless
+        it is given.
         """
-        reached = limits_reached(model, self.grid, self.every)
-        if not reached:
-            return "", False
-        reason = "the readings need as many coefficients as "
-        ended = any("empirical" in words for words in self.beyond)
-        if ended if reached == (0,) else self.most not in reached:
-            return f"{reason}this design determines: their sufficiency is untested", True
-        return (
-            f"{reason}were tried, and may need more, for example for an error that repeats over"
-            " short distances",
-            False,
-        )
+        count = self.at.design.observation_count
+        parameters, misfit = count - self.degrees_of_freedom, self.sum_of_squares
+        if not is_given:
+            parameters += 1
+            misfit = count * float(np.log(max(misfit / count, ROUNDING)))
+        return misfit + float(np.log(count)) * parameters
+
+    def chance(self, larger: RungFit, is_given: bool) -> float:
+        """Chance of what a larger model explains if this one is right."""
+        freedom = larger.degrees_of_freedom
+        sum_left = max(larger.sum_of_squares, ROUNDING * freedom)
+        gain = max(self.sum_of_squares, ROUNDING * freedom) - sum_left
+        return chance_of(gain, self.degrees_of_freedom - freedom, sum_left, freedom, is_given)
+
+    def beaten(self, rivals: list[RungFit], is_given: bool) -> Beaten:
+        """The larger model of the same kind that explains most, by chance."""
+        chances = [
+            (self.chance(rival, is_given), rival.model.words)
+            for rival in rivals
+            if rival.model.contains(self.model)
+        ]
+        least, by = min(chances, default=(1.0, ""))
+        return Beaten(least, len(chances), by)
 
 
-@single_threaded
-def climb(
-    experiment: Experiment,
-    observed: ObservedReadings,
-    is_given: bool,
-    most: int = MOST_COEFFICIENTS,
-) -> Climb:
-    """Choose the smallest model that no larger one improves significantly; `most` coefficients at
-    most.
-
-    :raises ExperimentError: priors of the file's own parameters, an estimate that does not
-        converge, or readings that leave no degrees of freedom even with straight axes.
+def first_adequate(fits: list[RungFit], is_given: bool) -> RungFit:
+    """The model with the fewest parameters, of several in this order, that no larger one beats by
+    a test or, if of another kind, by BIC; the largest if each is beaten.
     """
-    refuse_priors(experiment, observed.design)
-
-    def make(position: int, rotation: int, own_degrees: dict[str, int]) -> LadderModel:
-        return kinematic_rung(experiment, position, rotation, own_degrees)
-
-    judge = _Judge(observed.design, deficiency(observed.design, make(*POOREST, {})))
-    richest, beyond = _richest_polynomials(make, judge, most)
-    if not judge.leaves_freedom(richest):
-        text = "the readings leave no degrees of freedom to compare error models by; read more"
-        raise refused(experiment.source, text, "positions")
-    fit = fit_rung(experiment, observed, richest)
-    grid = PolynomialGrid(fit.fitted, nested_sums(fit.at), make)
-    every = grid.every()
-    for count in EMPIRICAL if experiment.dimension == 3 else ():
-        if count > most:
-            break
-        model = empirical_rung(experiment, count)
-        if not judge.determines(model):
-            beyond = (*beyond, f"empirical, {count} coefficients or more")
-            break
-        every.append(fit_rung(experiment, observed, model).fitted)
-    test = Comparison(is_given, observed.design.observation_count)
-    return Climb(grid, every, *first_adequate(grid, every, test), beyond, most)
-
-
-@dataclass(frozen=True)
-class _Judge:
-    """True if a design determines a model; `open` directions it leaves undetermined with any."""
-
-    design: Design
-    open: int
-
-    def determines(self, model: LadderModel) -> bool:
-        return self.leaves_freedom(model) and deficiency(self.design, model) == self.open
-
-    def leaves_freedom(self, model: LadderModel) -> bool:
-        design = with_model(self.design, model.model)
-        return design.observation_count - design.parameter_count + self.open > 0
-
-
-def _richest_polynomials(
-    make: Callable[[int, int, dict[str, int]], LadderModel], judge: _Judge, most: int
-) -> tuple[LadderModel, tuple[str, ...]]:
-    """Return the largest polynomials that a design determines, and a description of the others."""
-    n = m = most
-    while (n, m) != POOREST and not judge.determines(make(n, m, {})):
-        n, m = max(n - 1, POOREST[0]), max(m - 1, POOREST[1])
-    while n < most and judge.determines(make(n + 1, m, {})):
-        n += 1
-    while m < most and judge.determines(make(n, m + 1, {})):
-        m += 1
-    if n == m == most:
-        return make(n, m, {}), ()
-    reason = f"kinematic, more than {n} and {m} coefficients"
-    return make(n, m, {}), (reason,)
+    for place, fit in enumerate(fits):
+        worse = fit.bic(is_given) - CLEARLY_WORSE
+        is_beaten = fit.beaten(fits, is_given).chance < FALSE_STEP
+        if not is_beaten and all(rival.bic(is_given) >= worse for rival in fits[place + 1 :]):
+            return fit
+    return fits[-1]
 
 
 def fit_rung(experiment: Experiment, observed: ObservedReadings, model: LadderModel) -> RungFit:
@@ -199,9 +112,8 @@ def fit_rung(experiment: Experiment, observed: ObservedReadings, model: LadderMo
             " ballplate fit"
         )
         raise refused(experiment.source, text, "error_model")
-    linearisation = linearised_fit(design, solution)
-    freedom = linearisation.degrees_of_freedom
-    return RungFit(FittedSum(model, solution.factor.sum_of_squares, freedom), linearisation)
+    at = linearised_fit(design, solution)
+    return RungFit(model, at, solution.factor.sum_of_squares, at.degrees_of_freedom)
 
 
 @single_threaded
@@ -217,45 +129,45 @@ def compared_models(
 
     `sigma` overrides the file; polynomials have `most` coefficients at most.
 
-    :raises ExperimentError: as `climb`.
+    :raises ExperimentError: as `determined_rungs`, or an estimate that does not converge.
     """
     is_given = (sigma or experiment.sigma) == "given"
-    climbed = climb(experiment, observed, is_given, most)
-    file = _of_file(experiment, observed.design.model, climbed)
-    test = Comparison(is_given, observed.design.observation_count)
-    models = _shown(climbed, fit_rung(experiment, observed, file), test)
-    fits = []
+    models, beyond = determined_rungs(experiment, observed.design, most)
+    file = rung_of_file(experiment, observed.design.model)
+    candidates = []
     for model in models:
-        fits.append(fit_rung(experiment, observed, model))
-        report(ProgressStep(f"error models of {experiment.label}", len(fits), len(models)))
-    chosen, richest = (
-        next(fit for fit in fits if fit.model.words == wanted.model.words)
-        for wanted in (climbed.chosen, climbed.richest)
-    )
+        candidates.append(fit_rung(experiment, observed, model))
+        report(ProgressStep(f"error models of {experiment.label}", len(candidates), len(models)))
+    of_file = next((fit for fit in candidates if fit.model.words == file.words), None)
+    fits = candidates
+    if of_file is None:
+        of_file = fit_rung(experiment, observed, file)
+        fits = sorted([*candidates, of_file], key=lambda fit: fit.model.count)
+    chosen, largest = first_adequate(candidates, is_given), candidates[-1]
     repeats = pure_error(chosen.at.design, chosen.at.state, observed.x)
-    faults, beaten = _faults(chosen, observed.x, repeats, is_given), climbed.beaten
-    if faults and richest is not chosen and not _faults(richest, observed.x, repeats, is_given):
-        chosen, faults, beaten = richest, (), Beaten(1.0, 0, "")
-    unconfirmed, for_want = climbed.unconfirmed(chosen.model)
-    unsure = unconfirmed if for_want else ""
-    if unconfirmed and not for_want:
-        faults = (*faults, unconfirmed)
-    elif not (unconfirmed or faults or beaten.count):
+    faults = _faults(chosen, observed.x, repeats, is_given)
+    if faults and largest is not chosen and not _faults(largest, observed.x, repeats, is_given):
+        chosen, faults = largest, ()
+    beaten, unsure = chosen.beaten(candidates, is_given), ""
+    if not beaten.count and type(chosen.model.settings) in beyond:
         unsure = NO_RICHER
-    mistakes = _mistakes(fits, file, observed.x, is_given)
-    scale = chosen.sigma(is_given)
+    elif not beaten.count:
+        faults = (*faults, NEEDS_MORE)
+    mistakes = _mistakes(of_file, observed.x, is_given)
+    variance = chosen.sum_of_squares / chosen.degrees_of_freedom
+    scale = 1.0 if is_given else float(np.sqrt(variance))
     rungs = (
         Rung(
             fit.model.words,
             fit.model.count,
-            fit.fitted.sum_of_squares,
-            fit.fitted.degrees_of_freedom,
-            test.criteria(fit.fitted),
-            test.beaten(fit.fitted, richer(fit.fitted, climbed.every)),
-            _change(fit.at, chosen.at),
+            fit.sum_of_squares,
+            fit.degrees_of_freedom,
+            fit.bic(is_given),
+            fit.beaten(candidates, is_given),
+            *_change_of_lengths(fit.at, chosen.at),
             fit is chosen,
-            fit.model.words == file.words,
-            max(fit.at.deficiency - richest.at.deficiency, 0),
+            fit is of_file,
+            max(fit.at.deficiency - largest.at.deficiency, 0),
         )
         for fit in fits
     )
@@ -270,9 +182,9 @@ def compared_models(
         is_given,
         scale,
         repeats,
-        _lack_of_fit(chosen.fitted, repeats),
+        _lack_of_fit(chosen, repeats),
         beaten,
-        climbed.beyond,
+        tuple(beyond.values()),
         uncertainties(chosen.at, scale, None, ("U6",))["U6"],
         2.0 if experiment.coverage_factor == 1.0 else experiment.coverage_factor,
         tuple(filter(None, (unsure, _untested(chosen.at.design)))),
@@ -285,53 +197,12 @@ def _untested(design: Design) -> str:
     return f"{text}: the residuals were not searched for structure" if text else ""
 
 
-def _of_file(experiment: Experiment, model: ErrorModel, climbed: Climb) -> LadderModel:
-    """Return the file's own model, as a rung if it is one."""
-    model_settings = experiment.error_model
-    made = next((fit.model for fit in climbed.every if fit.model.model == model), None)
-    if (
-        made is None
-        and isinstance(model_settings, KinematicSettings)
-        and model_settings.functions is None
-    ):
-        made = climbed.grid.make(
-            model_settings.position_coefficients, model_settings.rotation_coefficients, {}
-        )
-    return made if made is not None and made.model == model else own_rung(experiment, model)
-
-
-def _shown(climbed: Climb, file: RungFit, test: Comparison) -> list[LadderModel]:
-    """Return the models to show, with the fewest parameters first: polynomials with as many
-    coefficients for all errors, or as many as the design determines, empirical ones, the file's,
-    and those that the verdict names.
+def _change_of_lengths(one: Linearisation, other: Linearisation) -> tuple[float, float]:
+    """Return the largest and the root mean square difference of two fits in the lengths between
+    all evaluation points.
     """
-    largest = climbed.grid.richest.model.numbers
-    named = {
-        climbed.beaten.by,
-        test.beaten(file.fitted, richer(file.fitted, climbed.every)).by,
-        climbed.richest.model.words,
-    }
-
-    def is_shown(model: LadderModel) -> bool:
-        if model.numbers is None or largest is None or model.words in named:
-            return True
-        n, m = model.numbers
-        is_even = m == min(n, largest[1]) or n == min(m, largest[0])
-        return is_even or model.numbers == POOREST
-
-    models = [rung.model for rung in climbed.every if is_shown(rung.model)]
-    unique = {model.words: model for model in [*models, climbed.chosen.model, file.model]}
-    return sorted(unique.values(), key=lambda rung: rung.count)
-
-
-def _change(linearisation: Linearisation, other_linearisation: Linearisation) -> LengthChange:
-    """Return the difference of two fits in the lengths between all evaluation points."""
-    first, second = (
-        _lengths(rung_linearisation.design, rung_linearisation.state)
-        for rung_linearisation in (linearisation, other_linearisation)
-    )
-    change = first - second
-    return LengthChange(float(np.abs(change).max()), float(np.sqrt((change**2).mean())))
+    change = _lengths(one.design, one.state) - _lengths(other.design, other.state)
+    return float(np.abs(change).max()), float(np.sqrt((change**2).mean()))
 
 
 def _lengths(design: Design, state: State) -> Array:
@@ -342,15 +213,15 @@ def _lengths(design: Design, state: State) -> Array:
     return pdist(corrected_points(design, state, points, probes))
 
 
-def _lack_of_fit(fitted: FittedSum, repeats: PureError) -> float:
+def _lack_of_fit(fit: RungFit, repeats: PureError) -> float:
     """Return the p-value of a model's residuals beyond the noise of repeats; NaN without repeats,
     or without a remainder.
     """
-    dimensions = fitted.degrees_of_freedom - repeats.degrees_of_freedom
+    dimensions = fit.degrees_of_freedom - repeats.degrees_of_freedom
     if not repeats.degrees_of_freedom or dimensions <= 0:
         return float("nan")
-    sum_left = max(fitted.sum_of_squares - repeats.sum_of_squares, 0.0)
-    least = ROUNDING * fitted.degrees_of_freedom
+    sum_left = max(fit.sum_of_squares - repeats.sum_of_squares, 0.0)
+    least = ROUNDING * fit.degrees_of_freedom
     if sum_left <= least:
         return 1.0
     return chance_of(
@@ -358,10 +229,9 @@ def _lack_of_fit(fitted: FittedSum, repeats: PureError) -> float:
     )
 
 
-def _mistakes(fits: list[RungFit], file: LadderModel, x: Array, is_given: bool) -> tuple[str, ...]:
+def _mistakes(fit: RungFit, x: Array, is_given: bool) -> tuple[str, ...]:
     """Return descriptions of errors in the file that explain an excessive S^2 of its own model."""
-    fit = next(fit for fit in fits if fit.model.words == file.words)
-    square, freedom = fit.fitted.sum_of_squares, fit.fitted.degrees_of_freedom
+    square, freedom = fit.sum_of_squares, fit.degrees_of_freedom
     if too_many_entries(fit.at.design) or chance_of(square, freedom, 0.0, 0, True) > MISFIT:
         return ()
     diagnosis = diagnosis_with_refits(fit.at, x, freedom, not is_given)
@@ -374,14 +244,14 @@ def _mistakes(fits: list[RungFit], file: LadderModel, x: Array, is_given: bool) 
 
 def _faults(fit: RungFit, x: Array, repeats: PureError, is_given: bool) -> tuple[str, ...]:
     """Return descriptions of the residuals that a model leaves."""
-    faults, fitted, design = [], fit.fitted, fit.at.design
-    chance = _lack_of_fit(fitted, repeats)
+    faults, design = [], fit.at.design
+    chance = _lack_of_fit(fit, repeats)
     if chance < MISFIT:
         faults.append(
             "lack of fit: the residuals are larger than the noise of repeated readings explains"
             f" (p-value {chance_words(chance)})"
         )
-    square, freedom = fitted.sum_of_squares, fitted.degrees_of_freedom
+    square, freedom = fit.sum_of_squares, fit.degrees_of_freedom
     if is_given and chance_of(square, freedom, 0.0, 0, True) < MISFIT:
         faults.append(f"S^2 is {square / freedom:.3g} times its value for the stated uncertainties")
     if not too_many_entries(design):

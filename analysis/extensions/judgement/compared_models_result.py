@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ballplate.presentation import Data, FitResult, chance_words, number, picked, table_lines
 from ballplate.results import freedom_words
@@ -12,39 +12,45 @@ from ballplate.simulator.readings import ObservedReadings
 from ballplate.uncertainty import Quantity
 
 from .lack_of_fit import PureError
-from .rung_choice import FALSE_STEP, Beaten, Criteria
 from .rungs import FILE
 
-if TYPE_CHECKING:
-    pass
-
-# Criteria closer than this are the same but for rounding.
-SAME_CRITERION = 1e-2
+# Chance that a model is left although it is right, of all larger ones together (Bonferroni).
+FALSE_STEP = 0.01
 
 
 @dataclass(frozen=True)
-class LengthChange:
-    """Largest and root mean square difference of lengths between evaluation points, in metres."""
+class Beaten:
+    """The least chance, among `count` larger models of the same kind, of what one of them explains
+    more: that of `by`, empty without any.
+    """
 
-    largest: float
-    rms: float
+    least: float
+    count: int
+    by: str
+
+    @property
+    def chance(self) -> float:
+        """The chance that any of so many explains as much; 1 without any."""
+        return min(1.0, self.least * max(self.count, 1))
 
 
 @dataclass(frozen=True)
 class Rung:
-    """An error model on the ladder: its number of parameters, its S^2 and degrees of freedom.
+    """An error model that was fitted: its number of parameters, its S^2 and degrees of freedom.
 
-    `change` is the difference of its corrected lengths from the recommended model's. Parameters
-    undetermined beyond those of other rungs are `undetermined`.
+    The changes are differences of its corrected lengths between evaluation points from the
+    recommended model's, in metres. Parameters undetermined beyond those of the largest model are
+    `undetermined`.
     """
 
     model: str
     parameters: int
     sum_of_squares: float
     degrees_of_freedom: int
-    criteria: Criteria
+    bic: float
     beaten: Beaten
-    change: LengthChange
+    largest_change: float
+    rms_change: float
     is_recommended: bool
     is_of_file: bool
     undetermined: int = 0
@@ -118,7 +124,7 @@ class ComparedModels(FitResult):
                 f" {self.beaten.count}; of {self.beaten.by})"
             )
         else:
-            why = "it is the largest that this design determines"
+            why = "it is the largest of its kind that this design determines"
         lines = [f"recommended: {self.recommended}; {why}"]
         file = next((rung for rung in self.rungs if rung.is_of_file), None)
         if file is not None and not file.is_recommended:
@@ -135,42 +141,34 @@ class ComparedModels(FitResult):
         elif file.parameters > chosen.parameters:
             sentence = "has more parameters than the readings need"
         else:
-            apart = file.criteria.bic - chosen.criteria.bic
-            word = (
-                "as good"
-                if abs(apart) < SAME_CRITERION
-                else "the better"
-                if apart < 0
-                else "the worse"
-            )
-            sentence = f"is not nested with these; by BIC it is {word}"
+            apart = file.bic - chosen.bic
+            sentence = f"is not nested with these; its BIC differs by {apart:+.1f}"
         sentence = f"the file's error model, {file.model.removeprefix(FILE)}, {sentence}"
         if self.lengths.undetermined:
             return sentence
-        return f"{sentence}; it changes lengths by {self._length(file.change.rms)} µm rms"
+        return f"{sentence}; it changes lengths by {self._length(file.rms_change)} µm rms"
 
     def lines(self) -> list[str]:
         how = "given" if self.sigma_is_given else "estimated"
         test = "chi-squared" if self.sigma_is_given else "F"
-        least = [min(getattr(rung.criteria, key) for rung in self.rungs) for key in ("aic", "bic")]
+        least = min(rung.bic for rung in self.rungs)
         columns = {
             "": "model",
             "parameters": "parameters",
             "freedom": "degrees_of_freedom",
             "sigma": ("sigma", "{:.4g}".format),
             f"{test}: p-value": (_chance, chance_words),
-            "AIC": (lambda rung: rung.criteria.aic - least[0], "{:.1f}".format),
-            "BIC": (lambda rung: rung.criteria.bic - least[1], "{:.1f}".format),
-            "largest change": ("change.largest", self._length),
-            "rms, µm": ("change.rms", self._length),
+            "BIC": (lambda rung: rung.bic - least, "{:.1f}".format),
+            "largest change": ("largest_change", self._length),
+            "rms, µm": ("rms_change", self._length),
             " ": self._marks,
         }
         lines = [
             self.heading,
             (
                 f"error models on the same readings, sigma {how}; p-value: of the largest"
-                " improvement by a larger model, adjusted for their number; AIC and BIC above the"
-                f" least; changes of lengths from {self.recommended}"
+                " improvement by a larger model of its kind, adjusted for their number; BIC above"
+                f" the least; changes of lengths from {self.recommended}"
             ),
             "",
             *table_lines(columns, self.rungs),
@@ -179,7 +177,9 @@ class ComparedModels(FitResult):
             *self._of_repeats(),
         ]
         if self.beyond:
-            lines.append(f"not determined by this design, and no candidates: {self._beyond()}")
+            lines.append(
+                f"not determined by this design, and no candidates: {'; '.join(self.beyond)}"
+            )
         return [*lines, *self.verdict()]
 
     def _marks(self, rung: Rung) -> str:
@@ -190,9 +190,6 @@ class ComparedModels(FitResult):
         }
         words = ", ".join(word for word, is_so in marks.items() if is_so)
         return f"<- {words}" if words else ""
-
-    def _beyond(self) -> str:
-        return "; ".join(self.beyond)
 
     def _length(self, value: float) -> str:
         return "undetermined" if self.lengths.undetermined else number(1e6 * value, 3)
@@ -240,16 +237,15 @@ class ComparedModels(FitResult):
     def rows(self) -> list[Data]:
         """One row for each error model."""
         lengths_are_open = self.lengths.undetermined > 0
-        names = ("model", "parameters", "degrees_of_freedom", "sum_of_squares")
+        names = ("model", "parameters", "degrees_of_freedom", "sum_of_squares", "bic")
         return [
             {
                 **picked(rung, *names),
-                **vars(rung.criteria),
                 "chance": rung.beaten.chance if rung.beaten.count else None,
                 "richer_models": rung.beaten.count,
                 "best_richer_model": rung.beaten.by or None,
-                "largest_change": None if lengths_are_open else rung.change.largest,
-                "rms_change": None if lengths_are_open else rung.change.rms,
+                "largest_change": None if lengths_are_open else rung.largest_change,
+                "rms_change": None if lengths_are_open else rung.rms_change,
                 "unit": "m",
                 "recommended": rung.is_recommended,
                 "of_the_file": rung.is_of_file,

@@ -1,4 +1,4 @@
-"""Positions, plates and directions left out in turn, and predicted from the rest.
+"""Positions left out in turn, and predicted from the rest.
 
 Readings left out have uncertainties a thousand times as large, so that they add no information on
 the machine, while the pose of a position left out, and balls read only there, come from its own
@@ -9,7 +9,6 @@ the prediction errors, weighted with their own covariance, the noise of the read
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -21,7 +20,6 @@ from ballplate.simulator.design import (
     Design,
     Flags,
     Lengths,
-    Observations,
     measured,
     reading_uncertainties,
 )
@@ -40,7 +38,7 @@ from ballplate.simulator.machines import Array, Integers
 from ballplate.simulator.readings import ObservedReadings
 
 from .lack_of_fit import chance_of
-from .left_out_result import LengthDifference, PredictedGroup, PredictedReading, Validation
+from .left_out_result import LengthDifference, PredictedPosition, PredictedReading, Validation
 
 # How many times as uncertain what is left out is; the square of this is what it tells at the most.
 OUT = 1e3
@@ -54,91 +52,29 @@ NOT_PREDICTED = 1e-3
 # Points between which lengths are compared, the first of the evaluation.
 MOST_POINTS = 64
 
-# Cosine from which on two positions have the same direction.
-PARALLEL = 0.99
 
-
-@dataclass(frozen=True)
-class LeftGroup:
-    """Readings left out together: `positions` (k,), and the `artefact`'s certificates if it is not
-    -1.
-    """
-
-    kind: Literal["position", "plate", "direction"]
-    name: str
-    positions: Integers
-    artefact: int = -1
-
-
-def groups_to_leave(design: Design) -> list[LeftGroup]:
-    """Return all positions that were read, all plates and standards, and all directions of plates,
-    except groups that are the whole.
-    """
-    positions_read = np.unique(design.readings.position)
-    groups = [
-        LeftGroup("position", design.positions.names[k], np.array([k]))
-        for k in positions_read.tolist()
-    ]
-    artefact = design.positions.artefact[positions_read]
-    for k in np.unique(artefact).tolist():
-        groups.append(
-            LeftGroup("plate", design.artefacts.names[k], positions_read[artefact == k], k)
-        )
-    plates = positions_read[design.artefacts.is_plate[artefact]]
-    groups += [LeftGroup("direction", name, same) for name, same in _directions(design, plates)]
-    return [group for group in groups if len(group.positions) < len(positions_read)]
-
-
-def _directions(design: Design, positions: Integers) -> Iterator[tuple[str, Integers]]:
-    """Positions whose normals are parallel, in the plane whose sides are."""
-    d = design.dimension
-    axes = design.positions.rotations[positions][:, :, -1 if d == 3 else 0]
-    remaining = np.arange(len(positions))
-    while len(remaining):
-        axis = axes[remaining[0]]
-        same = np.abs(axes[remaining] @ axis) > PARALLEL
-        of_machine = np.abs(axis) > PARALLEL
-        letter = AXIS_NAMES[int(of_machine.argmax())] if of_machine.any() else ""
-        word = ("across" if d == 3 else "along") + f" {letter}"
-        name = word if letter else f"as {design.positions.names[positions[remaining[0]]]}"
-        yield name, positions[remaining[same]]
-        remaining = remaining[~same]
-
-
-def without(design: Design, group: LeftGroup) -> tuple[Design, Flags]:
-    """Return the design with a group left out, and a mask (rows,) of the rows with negligible
-    weight.
+def without(design: Design, position: int) -> tuple[Design, Flags]:
+    """Return the design with a position's readings left out, and a mask (rows,) of the rows with
+    negligible weight.
     """
     readings, lengths = design.readings, design.of(Lengths)
-    out = np.isin(readings.position, group.positions)
+    out = readings.position == position
     uncertainty = reading_uncertainties(design, readings) * np.where(out, OUT, 1.0)[:, None]
-    changed: list[Observations] = [lengths.select(~out[lengths.first])]
-    is_out = {}
-    for observation in design.observations:
-        if not isinstance(observation, Lengths):
-            mine = np.zeros(observation.count(design), bool)
-            if group.artefact >= 0 and observation.balls.shape[1]:
-                mine = design.balls.artefact[observation.balls[:, 0]] == group.artefact
-            is_out[type(observation)] = mine
-            changed.append(
-                observation.enlarged(np.where(mine, OUT, 1.0)) if mine.any() else observation
-            )
     design_left = replace(design, readings=replace(readings, uncertainty=uncertainty)).observed(
-        *changed
+        lengths.select(~out[lengths.first])
     )
-    places, rows = row_places(design_left), np.zeros(row_count(design_left), bool)
-    rows[places["reading"]] = np.repeat(out[design.plate_readings], design.dimension)
-    for observation in design_left.observations:
-        if not isinstance(observation, Lengths):
-            rows[places[observation.word]] = is_out[type(observation)]
+    rows = np.zeros(row_count(design_left), bool)
+    rows[row_places(design_left)["reading"]] = np.repeat(
+        out[design.plate_readings], design.dimension
+    )
     return design_left, rows
 
 
 @dataclass(frozen=True, eq=False)
 class RestFit:
-    """The estimate without a group: its linearisation, S^2 and degrees of freedom, and of the rows
-    left out the prediction errors (m,), their variances (m,) in those of the readings, and how the
-    root of the covariance depends on them, `common` (m, r).
+    """The estimate without a position: its linearisation, S^2 and degrees of freedom, and of the
+    rows left out the prediction errors (m,), their variances (m,) in those of the readings, and how
+    the root of the covariance depends on them, `common` (m, r).
     """
 
     at: Linearisation
@@ -151,9 +87,9 @@ class RestFit:
 
 
 @single_threaded
-def rest_of(design: Design, x: Array, group: LeftGroup) -> RestFit | None:
-    """Return the estimate without a group, if it converges."""
-    design_left, is_out = without(design, group)
+def rest_of(design: Design, x: Array, position: int) -> RestFit | None:
+    """Return the estimate without a position, if it converges."""
+    design_left, is_out = without(design, position)
     solution = estimate(design_left, x)
     if solution.status != "converged":
         return None
@@ -203,7 +139,7 @@ def validate(
     sigma: Literal["estimated", "given"] | None = None,
     report: Report = unreported,
 ) -> Validation:
-    """Predict each position, plate and direction from all others.
+    """Predict each position that was read from all others.
 
     :raises ExperimentError: the estimate from all readings does not converge.
     """
@@ -217,27 +153,28 @@ def validate(
         raise refused(experiment.source, text)
     linearisation = linearised_fit(design, solution)
     freedom = linearisation.degrees_of_freedom
-    groups = groups_to_leave(design)
-    left_groups = []
-    for group in groups:
-        left_groups.append(_left_out(linearisation, freedom, observed, group, is_given))
-        report(ProgressStep(f"left out of {experiment.label}", len(left_groups), len(groups)))
+    positions = np.unique(design.readings.position).tolist()
+    left_out: list[PredictedPosition] = []
+    for position in positions if len(positions) > 1 else ():
+        left_out.append(_left_out(linearisation, freedom, observed, position, is_given))
+        report(ProgressStep(f"left out of {experiment.label}", len(left_out), len(positions)))
     return Validation(
         experiment.label,
         experiment.title,
         observed,
-        tuple(left_groups),
+        tuple(left_out),
         is_given,
         2.0 if experiment.coverage_factor == 1.0 else experiment.coverage_factor,
     )
 
 
 def _left_out(
-    full: Linearisation, freedom: int, observed: ObservedReadings, group: LeftGroup, is_given: bool
-) -> PredictedGroup:
-    fit_of_rest = rest_of(full.design, observed.x, group)
+    full: Linearisation, freedom: int, observed: ObservedReadings, position: int, is_given: bool
+) -> PredictedPosition:
+    name = full.design.positions.names[position]
+    fit_of_rest = rest_of(full.design, observed.x, position)
     if fit_of_rest is None:
-        return PredictedGroup(group.kind, group.name, 0, float("nan"), float("nan"), 1.0, False)
+        return PredictedPosition(name, 0, float("nan"), float("nan"), 1.0, False)
     predicted = freedom - fit_of_rest.degrees_of_freedom
     square = max(full.factor.sum_of_squares - fit_of_rest.sum_of_squares, 0.0)
     scale = 1.0
@@ -247,9 +184,8 @@ def _left_out(
     chance = chance_of(
         square, predicted, fit_of_rest.sum_of_squares, fit_of_rest.degrees_of_freedom, is_given
     )
-    return PredictedGroup(
-        group.kind,
-        group.name,
+    return PredictedPosition(
+        name,
         predicted,
         square / max(predicted, 1),
         scale,
@@ -277,7 +213,6 @@ def _worst(
     uncertainties = reading_uncertainties(observed.design, observed.design.readings)[k, axis]
     uncertainties /= float(np.sqrt(design.readings.repeats[k]))
     return PredictedReading(
-        design.positions.names[design.readings.position[k]],
         design.ball_label(int(design.readings.ball[k])),
         design.probes.names[design.readings.probe[k]],
         AXIS_NAMES[axis],
@@ -290,7 +225,7 @@ def _worst(
 def _length_difference(
     full: Linearisation, fit_of_rest: RestFit, scale: float
 ) -> LengthDifference | None:
-    """Return the largest effect of a group on lengths between evaluation points, if the rest
+    """Return the largest effect of a position on lengths between evaluation points, if the rest
     determines any length.
 
     As the estimate from all readings is the best, the variance of its difference from that of some
@@ -324,7 +259,6 @@ def _length_difference(
     return LengthDifference(
         float(change[k]),
         scale * float(np.sqrt(variance)),
-        scale * float(u_full[k]),
         int((~is_known).sum()),
         (f"point {pairs[k, 0] + 1}", f"point {pairs[k, 1] + 1}"),
     )

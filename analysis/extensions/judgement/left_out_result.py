@@ -1,4 +1,4 @@
-"""Predictions of groups left out: text, data and rows."""
+"""Predictions of positions left out: text, data and rows."""
 
 from __future__ import annotations
 
@@ -18,7 +18,6 @@ class PredictedReading:
     the reading included.
     """
 
-    position: str
     ball: str
     probe: str
     axis: str
@@ -29,31 +28,25 @@ class PredictedReading:
 
 @dataclass(frozen=True)
 class LengthDifference:
-    """The largest change of a corrected length without a group, in metres, with the standard
-    uncertainties of the change and of the length. `undetermined` lengths rest on the group alone.
+    """The largest change of a corrected length without a position, in metres, with its standard
+    uncertainty. `undetermined` lengths rest on its readings alone.
     """
 
     change: float
     standard_uncertainty: float
-    of_length: float
     undetermined: int
     between: tuple[str, str]
 
-    @property
-    def standardised(self) -> float:
-        return self.change / self.standard_uncertainty if self.standard_uncertainty > 0.0 else 0.0
-
 
 @dataclass(frozen=True)
-class PredictedGroup:
-    """A position, plate or direction that was left out and predicted.
+class PredictedPosition:
+    """A position that was left out and predicted.
 
     `predicted` counts the independent co-ordinates that the others predict, `mean_square` is the
     mean square of their errors over the stated variances; `sigma` is the others' own. `chance` is
     the p-value of the errors.
     """
 
-    kind: str
     name: str
     predicted: int
     mean_square: float
@@ -66,40 +59,39 @@ class PredictedGroup:
 
 @dataclass(frozen=True, repr=False)
 class Validation(FitResult):
-    """Everything that can be left out of an experiment's readings, predicted from the rest."""
+    """Each position of an experiment's readings, predicted from the others."""
 
     label: str
     title: str
     observed: ObservedReadings
-    left_out: tuple[PredictedGroup, ...]
+    left_out: tuple[PredictedPosition, ...]
     sigma_is_given: bool
     coverage_factor: float
 
     @property
-    def failed(self) -> tuple[PredictedGroup, ...]:
-        """Groups whose prediction fails the joint test."""
-        tested = [group for group in self.left_out if group.predicted > 0]
-        return tuple(group for group in tested if group.chance * len(tested) < FAILED)
+    def failed(self) -> tuple[PredictedPosition, ...]:
+        """Positions whose prediction fails the joint test."""
+        tested = [position for position in self.left_out if position.predicted > 0]
+        return tuple(position for position in tested if position.chance * len(tested) < FAILED)
 
     @property
     def complaint(self) -> str:
-        lost = [group for group in self.left_out if not group.converged]
+        lost = [position for position in self.left_out if not position.converged]
         reasons = [
-            f"{group.kind} {group.name} is predicted wrongly by the others" for group in self.failed
+            f"position {position.name} is predicted wrongly by the others"
+            for position in self.failed
         ]
         reasons += [
-            f"without {group.kind} {group.name} the estimate does not converge" for group in lost
+            f"without position {position.name} the estimate does not converge" for position in lost
         ]
-        if not any(group.predicted for group in self.left_out):
-            reasons.append(
-                "no test is possible: no group that can be left out is predicted by the others"
-            )
+        if not any(position.predicted for position in self.left_out):
+            reasons.append("no test is possible: no position is predicted by the others")
         return "; ".join(reasons)
 
     def headline(self) -> str:
-        tested = sum(group.predicted > 0 for group in self.left_out)
+        tested = sum(position.predicted > 0 for position in self.left_out)
         if not tested:
-            return "no group that can be left out is predicted by the others"
+            return "no position is predicted by the others"
         return f"{tested} left out in turn, {len(self.failed)} predicted wrongly"
 
     def lines(self) -> list[str]:
@@ -107,16 +99,15 @@ class Validation(FitResult):
         k = self.coverage_factor
         failed = self.failed
         columns = {
-            "left out": "kind",
-            "": "name",
+            "position left out": "name",
             "predicted": "predicted",
             "rms error / u": (_error, 3),
             f"{test}: p-value": (_chance, chance_words),
             "worst reading": _worst,
             "error / u": ("worst.standardised", 3),
             "length, µm": ("lengths.change", 3),
-            f"U (k = {k:g}), µm": (lambda group: _expanded(group, k), 3),
-            " ": lambda group: "<- failed" * (group in failed),
+            f"U (k = {k:g}), µm": (lambda position: _expanded(position, k), 3),
+            " ": lambda position: "<- failed" * (position in failed),
         }
         lines = [
             self.heading,
@@ -129,22 +120,22 @@ class Validation(FitResult):
             "",
             *table_lines(columns, self.left_out),
         ]
-        tested = sum(group.predicted > 0 for group in self.left_out)
+        tested = sum(position.predicted > 0 for position in self.left_out)
         if not tested:
             return [*lines, self.headline()]
         if not failed:
-            least = min(group.chance for group in self.left_out if group.predicted > 0)
+            least = min(position.chance for position in self.left_out if position.predicted > 0)
             summary = (
                 f"no prediction fails: the smallest of {tested} p-values is {chance_words(least)}"
             )
             return [*lines, summary]
-        names = ", ".join(f"{group.kind} {group.name}" for group in failed)
+        names = ", ".join(position.name for position in failed)
         return [
             *lines,
             (
-                f"predicted wrongly: {names}; the error model is too small there, or the readings"
-                " or certificates contradict one another: see ballplate models and the readings"
-                " that fit flags"
+                f"predicted wrongly: position {names}; the error model is too small there, or the"
+                " readings or certificates contradict one another: see ballplate models and the"
+                " readings that fit flags"
             ),
         ]
 
@@ -152,8 +143,8 @@ class Validation(FitResult):
         return {
             **self.named,
             **picked(self, "sigma_is_given"),
-            "left_out": [_data(group) for group in self.left_out],
-            "failed": [f"{group.kind} {group.name}" for group in self.failed],
+            "left_out": [_data(position) for position in self.left_out],
+            "failed": [position.name for position in self.failed],
             **self.notes_data(),
         }
 
@@ -163,7 +154,6 @@ class Validation(FitResult):
 
 
 COLUMNS = {
-    "kind": "kind",
     "left out": "name",
     "predicted": "predicted",
     "mean square error": "mean_square",
@@ -176,32 +166,30 @@ COLUMNS = {
 }
 
 
-def _error(group: PredictedGroup) -> float:
+def _error(position: PredictedPosition) -> float:
     """Return the root mean square of standardised errors; NaN without a prediction."""
-    is_known = group.predicted and group.sigma > 0.0
-    return group.mean_square**0.5 / group.sigma if is_known else math.nan
+    is_known = position.predicted and position.sigma > 0.0
+    return position.mean_square**0.5 / position.sigma if is_known else math.nan
 
 
-def _chance(group: PredictedGroup) -> float:
-    return group.chance if group.predicted else math.nan
+def _chance(position: PredictedPosition) -> float:
+    return position.chance if position.predicted else math.nan
 
 
-def _worst(group: PredictedGroup) -> str:
-    if group.worst is None:
-        return ""
-    where = "" if group.kind == "position" else f"{group.worst.position}: "
-    return f"{where}{group.worst.ball} {group.worst.probe} {group.worst.axis}"
+def _worst(position: PredictedPosition) -> str:
+    worst = position.worst
+    return f"{worst.ball} {worst.probe} {worst.axis}" if worst else ""
 
 
-def _expanded(group: PredictedGroup, k: float) -> float:
-    return k * group.lengths.standard_uncertainty if group.lengths else math.nan
+def _expanded(position: PredictedPosition, k: float) -> float:
+    return k * position.lengths.standard_uncertainty if position.lengths else math.nan
 
 
-def _data(group: PredictedGroup) -> Data:
+def _data(position: PredictedPosition) -> Data:
     return {
-        **picked(group, "kind", "name", "converged", "predicted"),
-        "mean_square_error": group.mean_square,
-        **picked(group, "sigma", "chance"),
-        "worst_reading": group.worst and vars(group.worst),
-        "largest_length_difference": group.lengths and {**vars(group.lengths), "unit": "m"},
+        **picked(position, "name", "converged", "predicted"),
+        "mean_square_error": position.mean_square,
+        **picked(position, "sigma", "chance"),
+        "worst_reading": position.worst and vars(position.worst),
+        "largest_length_difference": position.lengths and {**vars(position.lengths), "unit": "m"},
     }

@@ -7,8 +7,8 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from ballplate.cli import add_json, add_readings, observed_readings, warn_of, whole
 
 DESCRIPTION = (
-    "Fit error models from the smallest to the largest that the design determines, kinematic ones"
-    " with more and more coefficients and empirical ones. Recommend the smallest that no larger"
+    "Fit the file's error model, kinematic ones with more and more coefficients and empirical ones,"
+    " as far as the design determines them. Recommend the smallest that no larger"
     " one improves significantly; print the changes of corrected lengths. The exit status is 0 if"
     " one is recommended, otherwise 1."
 )

@@ -1,57 +1,34 @@
-"""Groups of observations that have a variance component each, and designs with other ones."""
+"""Groups of observations: readings by axis, probe, position or artefact, and all others."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal, get_args
 
 import numpy as np
 from ballplate.extensions.reliability.hat import row_places
-from ballplate.results import Grouping
-from ballplate.simulator.design import (
-    Design,
-    Lengths,
-    Observations,
-    Priors,
-    measured,
-)
+from ballplate.simulator.design import Design, Observations, measured
 from ballplate.simulator.geometry import AXIS_NAMES
 from ballplate.simulator.machines import Integers
+
+Grouping = Literal["axis", "probe", "position", "artefact", "calibration"]
+
+GROUPINGS: tuple[Grouping, ...] = get_args(Grouping)
 
 
 @dataclass(frozen=True)
 class ObservationGroup:
-    """Observations that have their actual uncertainties in one ratio to the stated ones; `rows`
-    (k,) are those among the whitened rows of the design.
-    """
+    """Observations of one source; `rows` (k,) are those among the whitened rows of the design."""
 
     name: str
     rows: Integers
 
 
-def kinds_of_rows(design: Design, observations: Observations) -> list[str]:
-    """Return the group of each row of observations, by class and artefact.
-
-    Values of influence quantities from one statement are a group, whose variance the statement
-    gives.
-    """
-    if isinstance(observations, Priors):
-        parameters = design.influence_parameters
-        return [
-            "priors" if k < 0 else parameters[k].component or "influence quantities"
-            for k in observations.of_influence.tolist()
-        ]
-    count = observations.count(design)
-    if isinstance(observations, Lengths) or not observations.balls.shape[1]:
-        return [f"{observations.word}s"] * count
-    artefacts = design.balls.artefact[observations.balls[:, 0]].tolist()
-    return [f"{observations.word}s of {design.artefacts.names[k]}" for k in artefacts]
-
-
 def groups_of(
     design: Design,
     by: Grouping,
-    names_of: Callable[[Design, Observations], list[str]] = kinds_of_rows,
+    names_of: Callable[[Design, Observations], list[str]],
 ) -> tuple[ObservationGroup, ...]:
     """All whitened rows of a design in groups: readings of plates by axis, probe, position or
     artefact, or as one, and all other observations by the names of their rows.

@@ -1,11 +1,9 @@
-"""Error models of a ladder: polynomials of different lengths, empirical models, the file's own."""
+"""Error models that are compared: polynomials of different lengths, empirical, the file's own."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from ballplate.simulator.design import Design, Priors
@@ -13,23 +11,17 @@ from ballplate.simulator.estimation import linearise
 from ballplate.simulator.experiment import Experiment
 from ballplate.simulator.inputs import Settings, refused
 from ballplate.simulator.machines import (
-    Basis,
     EmpiricalSettings,
     ErrorModel,
-    FunctionsSettings,
-    KinematicModel,
     KinematicSettings,
-    PlaneModel,
     build_error_model,
 )
-
-from .containing_models import NotContainedError, linear_map
 
 # What the file's own model is called in front of its kind, where it is none of the others.
 FILE = "the file's, "
 
-# Coefficients of positional and rotational errors of the poorest rung: straight axes.
-POOREST = (2, 1)
+# Coefficients of positional and rotational errors of the smallest model: straight axes.
+STRAIGHT = (2, 1)
 
 # Numbers of coefficients of polynomials that are tried unless more are asked for.
 MOST_COEFFICIENTS = 8
@@ -40,29 +32,29 @@ EMPIRICAL = (3, 4, 5)
 
 @dataclass(frozen=True)
 class LadderModel:
-    """An error model of the ladder, with its settings as a file states them.
+    """An error model to compare, with its settings as a file states them.
 
-    `numbers` are the coefficients of all positional and of all rotational errors of a kinematic
-    one, None of others, and `own` those of single functions by ISO 230-1 name. Of an empirical one
-    `within` is the number of coefficients of the kinematic models that it contains.
+    `numbers` are the coefficients of all positional and of all rotational errors, None if a model
+    of the file states others.
     """
 
     words: str
     settings: Settings
     model: ErrorModel
     numbers: tuple[int, int] | None = None
-    own: tuple[tuple[str, int], ...] = ()
-    within: int = 0
 
     @property
     def count(self) -> int:
         """Number of parameters."""
         return len(self.model.parameters)
 
-    def coefficients(self, name: str, is_rotation: bool) -> int:
-        """Coefficients of an error function, the constant included."""
-        assert self.numbers is not None
-        return max(dict(self.own).get(name, 0), self.numbers[int(is_rotation)])
+    def contains(self, other: LadderModel) -> bool:
+        """True if another model is of the same kind, with fewer coefficients."""
+        if self.numbers is None or other.numbers is None or self.count <= other.count:
+            return False
+        return type(self.settings) is type(other.settings) and all(
+            mine >= its for mine, its in zip(self.numbers, other.numbers, strict=True)
+        )
 
 
 def with_model(design: Design, model: ErrorModel) -> Design:
@@ -72,66 +64,50 @@ def with_model(design: Design, model: ErrorModel) -> Design:
     return replace(design, model=model).observed(replace(priors, by_model=by_model))
 
 
-def refuse_priors(experiment: Experiment, design: Design) -> None:
-    """Refuse prior knowledge of the file's own parameters, which other models do not have.
-
-    :raises ExperimentError: there is such.
-    """
-    if design.of(Priors).of_model.any():
-        text = (
-            "models cannot be compared with priors of one model's parameters; remove the priors of"
-            " the machine's errors"
-        )
-        raise refused(experiment.source, text, "priors")
+def deficiency(design: Design, model: LadderModel) -> int:
+    """How many directions of its parameters a design with this model leaves undetermined."""
+    return linearise(with_model(design, model.model)).deficiency
 
 
-def kinematic_rung(
-    experiment: Experiment,
-    position: int,
-    rotation: int,
-    own_degrees: Mapping[str, int] | None = None,
-) -> LadderModel:
-    """A kinematic model with polynomials of so many coefficients, those of single functions
-    `own_degrees`; arranged as the file says if its model is kinematic.
+def kinematic_rung(experiment: Experiment, position: int, rotation: int) -> LadderModel:
+    """A kinematic model with polynomials of so many coefficients, arranged as the file says if its
+    model is kinematic.
     """
     kinematic = experiment.error_model
     if not isinstance(kinematic, KinematicSettings):
         kinematic = KinematicSettings(kind="kinematic")
-    basis: Literal["monomial", "chebyshev"] = (
-        "monomial" if kinematic.basis == "monomial" else "chebyshev"
-    )
-    single = {} if own_degrees is None else dict(own_degrees)
     settings = KinematicSettings(
         kind="kinematic",
         arrangement=kinematic.arrangement,
         rotations=kinematic.rotations,
         position_coefficients=position,
         rotation_coefficients=rotation,
-        basis=basis,
+        basis="monomial" if kinematic.basis == "monomial" else "chebyshev",
         squareness=kinematic.squareness,
-        **({"functions": FunctionsSettings(**single)} if single else {}),
     )
     words = f"kinematic, {position} and {rotation} coefficients"
-    if single:
-        words += "".join(f", {name} {count}" for name, count in single.items())
-    return LadderModel(
-        words, settings, _built(experiment, settings), (position, rotation), tuple(single.items())
-    )
+    return LadderModel(words, settings, _built(experiment, settings), (position, rotation))
 
 
 def empirical_rung(experiment: Experiment, coefficients: int) -> LadderModel:
     """An empirical model of sums of tensor products of polynomials with so many coefficients."""
     settings = EmpiricalSettings(kind="empirical", coefficients=coefficients)
     words = f"empirical, {coefficients} coefficients"
-    model = _built(experiment, settings)
-    kinematic = kinematic_rung(experiment, coefficients, coefficients)
-    within = coefficients if _within_once(kinematic.model, model) else 0
-    return LadderModel(words, settings, model, within=within)
+    numbers = (coefficients, coefficients)
+    return LadderModel(words, settings, _built(experiment, settings), numbers)
 
 
-def own_rung(experiment: Experiment, model: ErrorModel) -> LadderModel:
-    """The error model of the file."""
+def rung_of_file(experiment: Experiment, model: ErrorModel) -> LadderModel:
+    """The error model of the file, with its numbers of coefficients if it has no others."""
     settings: Any = experiment.error_model
+    rung = None
+    if isinstance(settings, KinematicSettings):
+        numbers = settings.position_coefficients, settings.rotation_coefficients
+        rung = kinematic_rung(experiment, *numbers)
+    elif isinstance(settings, EmpiricalSettings) and isinstance(settings.coefficients, int):
+        rung = empirical_rung(experiment, settings.coefficients)
+    if rung is not None and rung.model == model:
+        return rung
     return LadderModel(f"{FILE}{settings.kind}", settings, model)
 
 
@@ -139,56 +115,43 @@ def _built(experiment: Experiment, settings: Settings) -> ErrorModel:
     return build_error_model(settings, *experiment.machine.volume.corners)
 
 
-def deficiency(design: Design, rung: LadderModel) -> int:
-    """How many directions of its parameters a design with this model leaves undetermined."""
-    return linearise(with_model(design, rung.model)).deficiency
+def determined_rungs(
+    experiment: Experiment, design: Design, most: int
+) -> tuple[list[LadderModel], dict[type[Settings], str]]:
+    """Return the error models that a design determines, of at most `most` coefficients, and by
+    settings a description of those that it leaves undetermined.
 
-
-def contains(outer: LadderModel, inner: LadderModel) -> bool:
-    """True if an error model can do all that another can, and more."""
-    if inner.count >= outer.count:
-        return False
-    if inner.numbers is None:
-        return bool(inner.within and inner.within <= outer.within) or (
-            not (inner.within or outer.within) and _is_within(inner.model, outer.model)
-        )
-    chain = chain_of(inner.model).functions
-    if outer.numbers is None:
-        most = max(inner.coefficients(link.name, link.rotation) for link in chain)
-        return most <= outer.within
-    return all(
-        outer.coefficients(link.name, link.rotation) >= inner.coefficients(link.name, link.rotation)
-        for link in chain
-    )
-
-
-def _is_within(inner: ErrorModel, outer: ErrorModel) -> bool:
-    if outer.dimension != 3:
-        # Models are compared in space only.
-        return False
-    try:
-        linear_map(inner, outer)
-    except NotContainedError:
-        return False
-    return True
-
-
-_within_once: Any = lru_cache(maxsize=32)(_is_within)
-"""The same for models of this program, which are hashed: it takes as long as a fit."""
-
-
-def chain_of(model: ErrorModel) -> KinematicModel:
-    """The chain of axes of a kinematic rung, also in a plane."""
-    chain = model.spatial if isinstance(model, PlaneModel) else model
-    assert isinstance(chain, KinematicModel)
-    return chain
-
-
-def free_coefficients(basis: Basis, coefficients: int) -> int:
-    """How many functions of a polynomial basis are left with so many coefficients.
-
-    >>> from ballplate.simulator.machines.bases import Polynomial
-    >>> free_coefficients(Polynomial(8), 3), free_coefficients(Polynomial(8, True), 3)
-    (2, 1)
+    :raises ExperimentError: priors of the file's own parameters, which other models do not have,
+        or readings that leave no degrees of freedom even with straight axes.
     """
-    return max(coefficients - 1 - int(basis.zero_at_one), 0)
+    if design.of(Priors).of_model.any():
+        text = (
+            "models cannot be compared with priors of one model's parameters; remove the priors of"
+            " the machine's errors"
+        )
+        raise refused(experiment.source, text, "priors")
+    straight = kinematic_rung(experiment, *STRAIGHT)
+    undetermined = deficiency(design, straight)
+
+    def is_determined(model: LadderModel) -> bool:
+        tried = with_model(design, model.model)
+        freedom = tried.observation_count - tried.parameter_count + undetermined
+        return freedom > 0 and deficiency(design, model) == undetermined
+
+    if not is_determined(straight):
+        text = "the readings leave no degrees of freedom to compare error models by; read more"
+        raise refused(experiment.source, text, "positions")
+    kinematic = (kinematic_rung(experiment, count, count) for count in range(2, most + 1))
+    empirical = (empirical_rung(experiment, count) for count in EMPIRICAL if count <= most)
+    rungs, undetermined_rungs = [straight], dict[type[Settings], str]()
+    for models in (kinematic, empirical) if experiment.dimension == 3 else (kinematic,):
+        for model in models:
+            if not is_determined(model):
+                undetermined_rungs[type(model.settings)] = f"{model.words} or more"
+                break
+            rungs.append(model)
+    file = rung_of_file(experiment, design.model)
+    if file.numbers is not None and is_determined(file):
+        rungs.append(file)
+    unique = {model.words: model for model in rungs if model.count}
+    return sorted(unique.values(), key=lambda model: model.count), undetermined_rungs

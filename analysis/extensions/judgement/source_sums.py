@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from ballplate.extensions.reliability.hat import hat_rows, row_count, row_places
-from ballplate.results import Grouping
 from ballplate.simulator.computing import single_threaded
 from ballplate.simulator.design import (
     CalibratedCoordinates,
@@ -31,7 +30,7 @@ from ballplate.simulator.estimation import Linearisation
 from ballplate.simulator.experiment import Experiment
 from ballplate.simulator.machines import Array
 
-from .observation_groups import ObservationGroup, groups_of, kinds_of_rows
+from .observation_groups import Grouping, ObservationGroup, groups_of
 
 # Lengths of standards are formed of readings and compared with certificates; each row mixes both.
 READ_STANDARDS = "readings of length standards"
@@ -109,8 +108,8 @@ def _of_certificates(design: Design, rows: Array) -> dict[str, Array]:
 def sources_of(
     design: Design, experiment: Experiment, by: Grouping = "calibration"
 ) -> tuple[ObservationGroup, ...]:
-    """The sources of uncertainty of an experiment's design: the readings as variance components
-    group them, every item of calibration, stars, offsets of probes, priors by what they are about,
+    """The sources of uncertainty of an experiment's design: the readings in
+    groups, every item of calibration, stars, offsets of probes, priors by what they are about,
     and every influence quantity.
     """
     return groups_of(design, by, lambda design, source: _names(design, source, experiment))
@@ -129,13 +128,22 @@ def _names(design: Design, observations: Observations, experiment: Experiment) -
         observed = item.observed(0)
         if isinstance(observations, type(observed) if item.root is None else JointValues):
             names += [f"calibration[{k}]: {item.kind} of {item.subject}"] * len(observed)
-    other_kinds = kinds_of_rows(design, observations)[len(names) :]
+    other_kinds = _kinds_of_rows(design, observations)[len(names) :]
     if isinstance(observations, CalibratedCoordinates):
         # What no item states is how flat artefacts that are read in their plane are taken to be.
         other_kinds = [
             f"flatness of {name.removeprefix('coordinates of ')}" for name in other_kinds
         ]
     return names + other_kinds
+
+
+def _kinds_of_rows(design: Design, observations: Observations) -> list[str]:
+    """Return the group of each row of observations, by class and artefact."""
+    count = observations.count(design)
+    if isinstance(observations, Lengths) or not observations.balls.shape[1]:
+        return [f"{observations.word}s"] * count
+    artefacts = design.balls.artefact[observations.balls[:, 0]].tolist()
+    return [f"{observations.word}s of {design.artefacts.names[k]}" for k in artefacts]
 
 
 def _of_priors(design: Design, priors: Priors, experiment: Experiment) -> list[str]:

@@ -1,4 +1,4 @@
-"""`ballplate validate`: what is left out is predicted from the rest."""
+"""`ballplate validate`: positions left out are predicted from the rest."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from argparse import ArgumentParser, Namespace
 from ballplate.cli import add_json, add_readings, observed_readings, warn_of
 
 DESCRIPTION = (
-    "Leave out each position, plate and direction in turn, predict its readings from all others,"
+    "Leave out each position in turn, predict its readings from all others,"
     " and compare the errors with their uncertainties. The exit status is 0 if no"
     " prediction fails, otherwise 1."
 )

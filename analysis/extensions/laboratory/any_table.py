@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
 from ballplate.simulator.experiment import Coordinate, ReadingsSettings
 from ballplate.simulator.inputs import (
     LENGTH_UNITS,
@@ -25,19 +24,15 @@ from ballplate.simulator.inputs import (
     listing,
     metres_or_radians,
     parse_positive_length,
-    plain_number,
-    power_of_ten,
     refuse_controls,
     refused,
     shorten,
     text_of_cell,
 )
-from ballplate.simulator.machines import Array
 
 from .above_headings import said_above
-from .clock_times import ClockError, ReadTime, clock_time
+from .clock_times import ReadTime, clock_time
 from .column_units import units_of_columns
-from .doubtful_commas import commas_of_both_kinds, doubtful_decimals
 from .heading_words import NOTHING, quoted
 from .headings import TEXTS, Group, HeadedColumn, HeadingError, Vocabulary
 from .merged_cells import question
@@ -63,14 +58,13 @@ class TableRows:
     """Rows of tables of readings: the names of position, ball and probe, lengths in metres (x, y,
     z and u), and further columns; NaN if not stated.
 
-    `told` describes how each table was read. `diameters` (rows,) in metres are NaN if not stated.
+    `told` describes how each table was read.
     `coordinates` is the type of a report's co-ordinates, None for a table. `times` are those of
     rows with clock times.
     """
 
     rows: tuple[FileRow, ...]
     told: tuple[str, ...] = ()
-    diameters: tuple[float, ...] = ()
     coordinates: Coordinate | None = None
     times: tuple[ReadTime, ...] = ()
 
@@ -80,12 +74,10 @@ def read_any_table(
     encoding: str,
     words: Vocabulary,
     settings: ReadingsSettings,
-    is_possible: Callable[[Array], bool],
 ) -> TableRows:
     """Return rows of a table whose form is detected, or stated in the experiment.
 
-    `is_possible` is true if co-ordinates (m, d) in metres can be readings of the machine. Names
-    are those of the table; the probe is empty if not stated.
+    Names are those of the table; the probe is empty if not stated.
 
     :raises ExperimentError: the table is ambiguous, lacks columns or units, or has invalid
         entries.
@@ -105,16 +97,10 @@ def read_any_table(
         raise refused(source, f"more than {MOST_ROWS} rows; leave some out")
     try:
         form = chosen_form(forms_of(lines, words, settings))
-        if settings.decimal is None and commas_of_both_kinds(form):
-            raise NoFormError(
-                form.header,
-                "commas separate the columns, and perhaps decimals too: all co-ordinates are whole"
-                " numbers; write which under readings: decimal, or export with semicolons",
-            )
     except NoFormError as error:
         text = error.text or missing_columns(error.cells, words, words.axes)
         raise refused(source, text, line=error.line) from None
-    return _Reader(source, encoding, words, settings, form).read(is_possible)
+    return _Reader(source, encoding, words, settings, form).read()
 
 
 class AskedError(ExperimentError):
@@ -134,26 +120,22 @@ class _Reader:
     def error(self, text: str, line: int = 0) -> ExperimentError:
         return refused(self.source, text, line=line or max(self.form.header, 1))
 
-    def read(self, is_possible: Callable[[Array], bool]) -> TableRows:
+    def read(self) -> TableRows:
         form = self.form
         above, units = self._asked()
         texts, texts_above = self._texts(above)
-        rows_found = [
-            row for group in form.headings.groups for row in self._rows(group, texts, units)
-        ]
+        rows = [row for group in form.headings.groups for row in self._rows(group, texts, units)]
         # In the order that they were read in, also where several stand side by side.
-        rows_found.sort(key=lambda row: row[0].mark.line)
-        rows, diameters = [row for row, _ in rows_found], tuple(d for _, d in rows_found)
-        self._refuse_doubtful(rows, is_possible)
+        rows.sort(key=lambda row: row.mark.line)
         notes = (self._told(units, texts_above),)
         times = tuple(
-            (Mark(str(self.source), line, 1), cells[column.place], clock_time(cells[column.place]))
+            (Mark(str(self.source), line, 1), cells[column.place], *clock_time(cells[column.place]))
             for name, column in form.headings.roles.items()
             if name in self.words.further and column.unit is None
             for line, cells in form.rows
             if cells[column.place].casefold() not in NOTHING
         )
-        return TableRows(tuple(rows), notes, diameters, times=times)
+        return TableRows(tuple(rows), notes, times=times)
 
     def _asked(self) -> tuple[dict[str, str], dict[int, str]]:
         """Return texts above the headings, and units by index of the columns of lengths.
@@ -222,38 +204,34 @@ class _Reader:
 
     def _rows(
         self, group: Group, texts: Mapping[str, str], units: Mapping[int, str]
-    ) -> list[tuple[FileRow, float]]:
-        """Return rows of the readings of a group of columns, with diameters."""
+    ) -> list[FileRow]:
+        """Return rows of the readings of a group of columns."""
         roles, file = self.form.headings.roles, str(self.source)
         sign = DECIMALS[self.form.decimal]
         axes = [axis.place for axis in group.axes]
-        factors = {i: (LENGTH_UNITS[u], power_of_ten(LENGTH_UNITS[u])) for i, u in units.items()}
+        factors = {i: LENGTH_UNITS[u] for i, u in units.items()}
         further = [roles.get(name) for name in self.words.further]
         for name, names_known in self.words.further.items():
             if name in roles and (unit := roles[name].unit) is not None:
-                factors[roles[name].place] = names_known[unit], power_of_ten(names_known[unit])
+                factors[roles[name].place] = names_known[unit]
         constants = {**texts, **group.texts}
         places = self.form.headings.places
-        rows: list[tuple[FileRow, float]] = []
+        rows: list[FileRow] = []
         messages: list[Message] = []
 
         def number(cells: Sequence[str], i: int, mark: Mark) -> float:
-            factor, power = factors.get(i, (None, ""))
-            cell = cells[i].replace(sign, ".")
-            value = plain_number(cell, power)
-            if value is not None:
-                return value
+            factor, cell = factors.get(i), cells[i].replace(sign, ".")
             if cell.casefold() in NOTHING:
                 return math.nan
             try:
                 if factor is None:
-                    return clock_time(cells[i]).seconds
+                    return clock_time(cells[i])[1]
                 return metres_or_radians(cell, factor)
-            except (QuantityError, ClockError) as error:
+            except QuantityError as error:
                 messages.append(mark.message("", str(error)))
                 return math.nan
 
-        u, diameter = (roles[r].place if r in roles else None for r in ("u", "diameter"))
+        u = roles["u"].place if "u" in roles else None
         of_all = math.nan
         if u is not None and (constant := roles["u"].constant) is not None:
             u, of_all = None, parse_positive_length(constant)
@@ -279,35 +257,10 @@ class _Reader:
                 math.nan if column is None else number(cells, column.place, mark)
                 for column in further
             ]
-            size = math.nan if diameter is None else number(cells, diameter, mark)
-            rows.append((FileRow(mark, names, tuple(x)), size))
+            rows.append(FileRow(mark, names, tuple(x)))
         if messages:
             raise ExperimentError(messages)
         return rows
-
-    def _refuse_doubtful(
-        self, rows: Sequence[FileRow], is_possible: Callable[[Array], bool]
-    ) -> None:
-        """Refuse decimals that could be thousands, unless the readings were outside the machine.
-
-        :raises ExperimentError: they could.
-        """
-        # Where commas separate columns, a point is no sign of thousands.
-        form = self.form
-        is_clear = form.separator == "comma" and form.decimal == "point"
-        if self.settings.decimal is not None or is_clear:
-            return
-        cell = doubtful_decimals(form)
-        x = np.array([row.lengths[: len(self.words.axes)] for row in rows])
-        if cell and is_possible(1e3 * x):
-            plain, digits_only = cell.replace(",", "."), cell.replace(".", "").replace(",", "")
-            other = "point" if form.decimal == "comma" else "comma"
-            text = (
-                f'"{cell}" could be {plain} or {digits_only}, as could all numbers here; give'
-                f" --decimal {form.decimal} if it is {plain}, --decimal {other} if it is"
-                f" {digits_only}, or readings: {{decimal: {form.decimal}}}"
-            )
-            raise AskedError(self.error(text).messages)
 
     def _told(self, units: Mapping[int, str], notes_above: Sequence[str]) -> str:
         """Return a sentence on how the table was read."""

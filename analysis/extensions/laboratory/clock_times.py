@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from datetime import UTC, datetime
 
-from ballplate.simulator.inputs import Mark, Message, shorten
+from ballplate.simulator.inputs import Mark, Message, QuantityError, shorten
 
 DAY_FIRST = re.compile(r"([0-9]{1,2})\.([0-9]{1,2})\.([0-9]{4})[\sT,]+(.+)")
 TIME_OF_DAY = re.compile(r"([0-9]{1,2}):([0-9]{2})(?::([0-9]{2}(?:[.,][0-9]{1,9})?))?")
@@ -16,26 +15,15 @@ LONGEST = 60
 OF_DAY, OF_DATE, OF_ZONE = "times of a day", "dates without a zone", "dates with a zone"
 
 
-class ClockError(ValueError):
-    """A text that is no clock time; says what would be right."""
+def clock_time(text: str) -> tuple[str, float]:
+    """Return the kind of a time, and its seconds from the beginning that all of the kind have: of a
+    day, or with its date, by ISO 8601 or with the day first and points.
 
+    :raises QuantityError: the text is not a time.
 
-@dataclass(frozen=True)
-class ClockTime:
-    """Seconds from the beginning that all times of a kind have."""
-
-    kind: str
-    seconds: float
-
-
-def clock_time(text: str) -> ClockTime:
-    """Read a time of a day, or one with its date, by ISO 8601 or with the day first and points.
-
-    :raises ClockError: the text is not a time.
-
-    >>> clock_time("10:05"), clock_time("22.11.2026 10:05:30").seconds % 60
-    (ClockTime(kind='times of a day', seconds=36300.0), 30.0)
-    >>> clock_time("2026-11-22T10:05:00Z").seconds - clock_time("2026-11-22 10:04+00:00").seconds
+    >>> clock_time("10:05"), clock_time("22.11.2026 10:05:30")[1] % 60
+    (('times of a day', 36300.0), 30.0)
+    >>> clock_time("2026-11-22T10:05:00Z")[1] - clock_time("2026-11-22 10:04+00:00")[1]
     60.0
     """
     plain = text.strip()
@@ -43,7 +31,7 @@ def clock_time(text: str) -> ClockTime:
         hours, minutes = int(match[1]), int(match[2])
         seconds = float((match[3] or "0").replace(",", "."))
         if hours < 24 and minutes < 60 and seconds < 60.0:
-            return ClockTime(OF_DAY, 3600.0 * hours + 60.0 * minutes + seconds)
+            return OF_DAY, 3600.0 * hours + 60.0 * minutes + seconds
     if match := DAY_FIRST.fullmatch(plain):
         time = match[4] if re.match("[0-9]{2}:", match[4]) else f"0{match[4]}"
         plain = f"{match[3]}-{match[2]:>02}-{match[1]:>02}T{time}"
@@ -52,17 +40,17 @@ def clock_time(text: str) -> ClockTime:
             raise ValueError(plain)
         moment = datetime.fromisoformat(plain)
     except ValueError:
-        raise ClockError(
+        raise QuantityError(
             f'"{shorten(text)}" is no time of a clock; write 10:05:30 or 2026-11-22T10:05:30, or'
             " name the column with the unit of its numbers, such as time_s"
         ) from None
     if moment.tzinfo is None:
-        return ClockTime(OF_DATE, moment.replace(tzinfo=UTC).timestamp())
-    return ClockTime(OF_ZONE, moment.timestamp())
+        return OF_DATE, moment.replace(tzinfo=UTC).timestamp()
+    return OF_ZONE, moment.timestamp()
 
 
-# Where a time stands, as it is written, and what it is.
-ReadTime = tuple[Mark, str, ClockTime]
+# Where a time stands, as it is written, its kind and its seconds.
+ReadTime = tuple[Mark, str, str, float]
 
 
 def wrong_times(times: Sequence[ReadTime]) -> tuple[Message, ...]:
@@ -71,13 +59,14 @@ def wrong_times(times: Sequence[ReadTime]) -> tuple[Message, ...]:
     """
     if not times:
         return ()
-    kind = times[0][2].kind
     before = times[0]
-    for mark, text, time in times[1:]:
-        if time.kind != kind:
-            wrong = f"{time.kind}, and others are {kind}; write all of one kind"
+    kind = before[2]
+    for time in times[1:]:
+        mark, text, other_kind, seconds = time
+        if other_kind != kind:
+            wrong = f"{other_kind}, and others are {kind}; write all of one kind"
             return (mark.message("", wrong),)
-        if kind == OF_DAY and time.seconds < before[2].seconds:
+        if kind == OF_DAY and seconds < before[3]:
             there = "" if before[0].file == mark.file else f"{before[0].file}, "
             wrong = (
                 f"the time goes back from {shorten(before[1])} ({there}line {before[0].line}) to"
@@ -85,5 +74,5 @@ def wrong_times(times: Sequence[ReadTime]) -> tuple[Message, ...]:
                 " 2026-11-22T10:05, or order the rows and the files by time"
             )
             return (mark.message("", wrong),)
-        before = mark, text, time
+        before = time
     return ()

@@ -25,7 +25,7 @@ def with_stated_names(
     :raises ExperimentError: no name is of the rule, or a column states another name.
     """
     rule, others = settings.names, settings.probes or {}
-    rows, diameters, told = table.rows, table.diameters, table.told
+    rows, told = table.rows, table.told
     if others:
         probes = known_texts("probe", design, others)
         rows = tuple(
@@ -40,10 +40,12 @@ def with_stated_names(
             left = [name for name, parts in zip(names, parts_read, strict=True) if parts is None]
             more = f"; left out, of another form ({len(left)}): {quoted(left, 5)}" if left else ""
             told += (f"{file}: names are read as {rule}{more}",)
-        kept = [k for k, parts in enumerate(parts_read) if parts is not None]
-        rows = tuple(_with_parts(rows[k], parts_read[k] or {}, Path(file).stem) for k in kept)
-        diameters = tuple(diameters[k] for k in kept if diameters)
-    return replace(table, rows=rows, diameters=diameters, told=told)
+        rows = tuple(
+            _with_parts(row, parts, Path(file).stem)
+            for row, parts in zip(rows, parts_read, strict=True)
+            if parts is not None
+        )
+    return replace(table, rows=rows, told=told)
 
 
 def _with_parts(row: FileRow, parts: Parts, stem: str) -> FileRow:

@@ -30,8 +30,7 @@ def units_of_columns(
     units: dict[int, str] = {}
     without: list[int] = []
     axes = [axis for group in headings.groups for axis in group.axes]
-    others = (roles[role] for role in ("u", "diameter") if role in roles)
-    for column in [*axes, *(column for column in others if column.constant is None)]:
+    for column in [*axes, *([roles["u"]] if "u" in headings.places else [])]:
         unit = column.unit or form.units.get(column.place) or unit_stated or once
         named = headings.name(column.place)
         if column in axes and form.units_of_rows:
@@ -40,9 +39,6 @@ def units_of_columns(
                 text = f'lengths of "{named}" are said to be in {listing(sorted(said))}'
                 raise HeadingError(f"{text}; write one unit")
             (unit,) = said
-        if unit is None and column is roles.get("diameter") and len(set(units.values())) == 1:
-            # Of what stands beside co-ordinates in one unit, as an uncertainty may not.
-            (unit,) = set(units.values())
         if unit is None and column is roles.get("u") and not without:
             raise HeadingError(
                 f'the column "{named}" of uncertainties has no unit, which may be another than that'

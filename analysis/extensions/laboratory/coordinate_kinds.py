@@ -4,8 +4,6 @@ co-ordinates, with or without the machine's own correction.
 
 from __future__ import annotations
 
-from itertools import combinations
-
 import numpy as np
 from ballplate.simulator.design import (
     Design,
@@ -64,31 +62,26 @@ def as_scale_readings(
     return x
 
 
-def doubts_about_copies(design: Design, readings: Readings, x: Array) -> tuple[str, ...]:
-    """Return doubts about part co-ordinates (m, d) in the table: two positions have equal ones,
-    which copied files have and repeated measurements do not.
+def said_of(settings: ReadingsSettings) -> tuple[str, ...]:
+    """Return notes on estimates from co-ordinates other than scale readings of an uncorrected
+    machine.
     """
-    of_position = {
-        k: {
-            (int(ball), *place)
-            for ball, place in zip(
-                readings.ball[readings.position == k],
-                x[readings.position == k].tolist(),
-                strict=True,
-            )
-        }
-        for k in np.unique(readings.position).tolist()
-    }
-    doubts = []
-    for first, second in combinations(of_position, 2):
-        readings_of_first = of_position[first]
-        if len(readings_of_first) > design.dimension and readings_of_first == of_position[second]:
-            names = design.positions.names
-            doubts.append(
-                f'positions "{names[first]}" and "{names[second]}" have the same readings to the'
-                " last digit; if one is a copy of the other, replace it by its own readings"
-            )
-    return tuple(doubts)
+    sentences = []
+    if settings.coordinates == "part":
+        sentences.append(
+            "part co-ordinates were placed by the nominal poses: errors are estimated at the"
+            " artefact's planned locations"
+        )
+    if settings.compensation == "on":
+        sentences.append(
+            "the machine's own correction was on: the estimates are the errors that it leaves"
+        )
+    if isinstance(settings.compensation, CompensationSettings):
+        sentences.append(
+            f"the correction of {settings.compensation.file} was subtracted: the estimates are all"
+            " errors of the machine"
+        )
+    return tuple(sentences)
 
 
 def _in_machine(design: Design, readings: Readings, x: Array, file: object) -> Array:

@@ -7,57 +7,40 @@ from dataclasses import replace
 
 import numpy as np
 from ballplate.simulator.design import SLIGHTLY, Design, Lengths, Readings
-from ballplate.simulator.experiment import ReadingsSettings
 from ballplate.simulator.inputs import ExperimentError, Mark, Message, format_length
 from ballplate.simulator.machines import Array
 
-from .common_causes import common_cause, mistaken_positions, words_of_mistaken
+from .exchanged_positions import mistaken_positions, words_of_mistaken
 from .gross_errors import WrongPosition, WrongReading, find_gross_errors
 from .length_ratios import LengthRatio, doubtful_lengths
 from .plate_sizes import words_of_size
-from .wrong_offsets import only_position, wrong_offsets
 
-COMMON_CAUSE = (
-    "the readings of most positions do not fit; all do {}: correct the columns, the unit or the"
-    " readings section; otherwise correct the names of balls"
-)
+# Unexplained readings beyond this share have a cause in common.
+FEW = 0.2
 
 
-def refuse_gross_errors(
-    design: Design, x: Array, marks: Sequence[Mark], settings: ReadingsSettings
-) -> None:
-    """Refuse readings that cannot be of the stated ball, probe or length.
+def refuse_gross_errors(design: Design, x: Array, marks: Sequence[Mark]) -> None:
+    """Refuse scale readings x (readings, d) that cannot be of the stated ball, probe or length.
 
-    `marks` are the locations of the design's readings, and `settings` describe the source of the
-    scale readings x (readings, d). The rules are those of `gross_errors` and `length_ratios`.
+    `marks` are the locations of the design's readings. The rules are those of `gross_errors` and
+    `length_ratios`.
 
     :raises ExperimentError: gross errors; names all of them.
     """
     positions, readings = find_gross_errors(design, x)
     if (positions or readings) and (size := words_of_size(design, x)):
-        cause = common_cause(design, x, settings)
-        raise marks[0].refused(COMMON_CAUSE.format(cause) if cause else size)
-    mistakes = wrong_offsets(design, design.readings, x) if positions or readings else []
-    if mistakes:
-        causes = ", or if ".join(mistake.words(design) for mistake in mistakes)
-        text = (
-            f"the readings with different probes fit one another only if {causes}: correct the"
-            " offsets under probes, or the names of probes in the readings"
-        )
-        only = only_position(design, mistakes[0].probes[0])
-        if mistakes[0].is_off and only >= 0:
-            name = design.positions.names[only]
-            text += f"; or the artefact moved in position {name} between the probes: read it again"
-        raise marks[0].refused(text)
+        raise marks[0].refused(size)
     if positions:
-        places = x + design.probes.offsets[design.readings.probe]
-        mistaken = mistaken_positions(design, design.readings, places)
+        mistaken = mistaken_positions(design, x)
         if {wrong.position for wrong in positions} <= set(mistaken):
             raise marks[0].refused(words_of_mistaken(design, mistaken))
-    if 2 * len(positions) > len(np.unique(design.readings.position)) > 1:
-        cause = common_cause(design, x, settings)
-        if cause:
-            raise marks[0].refused(COMMON_CAUSE.format(cause))
+    unexplained = [wrong.reading for wrong in readings if wrong.is_unexplained]
+    if len(unexplained) > FEW * len(design.readings):
+        text = (
+            f"{len(unexplained)} of {len(design.readings)} readings do not fit the others: correct"
+            " the offsets of probes, the names of balls and probes, or readings: {coordinates: …}"
+        )
+        raise marks[unexplained[0]].refused(text)
     messages = [_of_position(design, wrong, marks) for wrong in positions]
     handled = set()
     for wrong in readings:
@@ -65,10 +48,9 @@ def refuse_gross_errors(
             messages.append(_of_reading(design, wrong, marks))
             handled |= {wrong.reading, wrong.partner}
     if not messages:
-        doubtful = doubtful_lengths(design, x)
         messages = [
             marks[mistake.reading].message("", _of_length(design, mistake))
-            for mistake in doubtful
+            for mistake in doubtful_lengths(design, x)
             if mistake.is_impossible
         ]
     if messages:
@@ -166,13 +148,16 @@ def _of_position(design: Design, wrong: WrongPosition, marks: Sequence[Mark]) ->
     if wrong.turned:
         text = (
             f"position {name}: the readings fit the {artefact} turned {wrong.turned}; correct the"
-            " names of the balls that are read there, or the turn that the experiment file states"
-            " for the position"
+            " names of the balls that are read there, the columns of the axes, or the turn that the"
+            " experiment file states for the position"
         )
     else:
+        probes = design.readings.probe[design.readings.position == wrong.position]
+        of_probes = "the offsets of probes, readings: {coordinates: …}, "
         text = (
             f"position {name}: only {wrong.agreeing} of {wrong.count} readings fit the {artefact}"
-            " in any one pose; correct the names of the balls that are read there, or the artefact"
+            " in any one pose; correct the names of the balls that are read there,"
+            f" {of_probes if len(np.unique(probes)) > 1 else ''}or the artefact"
         )
     return first.message("", text)
 

@@ -62,6 +62,10 @@ class WrongReading:
     partner: int = -1
     undecided: bool = False
 
+    @property
+    def is_unexplained(self) -> bool:
+        return max(self.other_ball, self.other_probe, self.partner) < 0
+
 
 @dataclass(frozen=True)
 class WrongPosition:
@@ -94,17 +98,17 @@ def find_gross_errors(design: Design, x: Array) -> tuple[list[WrongPosition], li
     Readings of Bryan gauges pass: their directions need not be nominal.
     """
     compared = np.flatnonzero(~np.isin(design.readings.position, design.gauge_positions))
-    if len(compared) < len(design.readings):
-        of_others = replace(design, readings=design.readings.select(compared)).observed(
-            design.of(Lengths).select(np.zeros(0, np.int64))
-        )
-        positions, errors = _gross_errors(of_others, x[compared]) if len(compared) else ([], [])
-        back = np.append(compared, -1)
-        return positions, [
-            replace(error, reading=int(back[error.reading]), partner=int(back[error.partner]))
-            for error in errors
-        ]
-    return _gross_errors(design, x)
+    if not len(compared):
+        return [], []
+    of_others = replace(design, readings=design.readings.select(compared)).observed(
+        design.of(Lengths).select(np.zeros(0, np.int64))
+    )
+    positions, errors = _gross_errors(of_others, x[compared])
+    back = np.append(compared, -1)
+    return positions, [
+        replace(error, reading=int(back[error.reading]), partner=int(back[error.partner]))
+        for error in errors
+    ]
 
 
 def _gross_errors(design: Design, x: Array) -> tuple[list[WrongPosition], list[WrongReading]]:

@@ -51,8 +51,6 @@ WORDS = _words("""
     ball: esfera, bola
     probe: probe, stylus, tip, probe name, taster, taststift, mätspets, tastspets, palpeur
     probe: stylet, tastatore, stilo, palpador
-    diameter: diameter, diam, dia, durchmesser, sphere diameter, ball diameter, diamètre, diametro
-    diameter: diámetro
     unit: unit, units, einheit, einheiten, enhet, unité, unités, unite, unità, unita, unidad
 """)
 # Only where no column has one of the words above.
@@ -63,7 +61,6 @@ LESS_CLEAR = _words("""
     ball: element, merkmal, name, label, id, no, nr, number, nummer, punkt, élément, elemento
     ball: namn, nom, nome, nombre, numéro, numero
     probe: stylus name, tip name, sensor, probe no, stylus no, taster nr, tip no, spets, punta
-    diameter: d, ø, actual diameter, diameter actual, durchmesser ist
 """)
 # Words that say no more than that a number is a measured one, of an axis, or of a point.
 _OF_AXES = _words("""

@@ -216,23 +216,21 @@ def _uncertainty(cells: Sequence[str], columns_taken: set[int]) -> dict[str, Hea
     :raises HeadingError: several columns could be it, or one does not say which uncertainty it is.
     """
     headings_found = {
-        i: uncertainty_kind
+        i: headed
         for i, cell in enumerate(cells)
         if i not in columns_taken
         and len(cell) <= LONGEST
-        and (uncertainty_kind := headed_uncertainty(cell, heading)) is not None
+        and (headed := headed_uncertainty(cell, heading)) is not None
     }
     for kind in ("standard", "expanded", "unclear"):
-        places = [
-            i for i, uncertainty_kind in headings_found.items() if uncertainty_kind.kind == kind
-        ]
+        places = [i for i, headed in headings_found.items() if headed[0] == kind]
         if (place := _only("u", places, cells)) is not None:
             break
     else:
         return {}
-    named, uncertainty_kind = shorten(cells[place]), headings_found[place]
-    unit = uncertainty_kind.unit or "um"
-    column = {"u": HeadedColumn(place, uncertainty_kind.unit)}
+    named, (_, factor, stated_unit) = shorten(cells[place]), headings_found[place]
+    unit = stated_unit or "um"
+    column = {"u": HeadedColumn(place, stated_unit)}
     if kind == "standard":
         return column
     factors = [
@@ -240,25 +238,23 @@ def _uncertainty(cells: Sequence[str], columns_taken: set[int]) -> dict[str, Hea
         for i, cell in enumerate(cells)
         if i not in columns_taken and i != place and heading(cell)[0] in FACTORS
     ]
-    if kind == "unclear" and (uncertainty_kind.factor is not None or not factors):
+    if kind == "unclear" and (factor is not None or not factors):
         raise HeadingError(
             f'"{named}" does not say which uncertainty it is; call it standard_uncertainty_{unit},'
             f" or expanded_uncertainty_{unit} beside a column k, or something else where it is"
             " none; or name it as the standard uncertainty under readings:"
             f" {{columns: {{u: {named}}}}}"
         )
-    if len(factors) + (uncertainty_kind.factor is not None) > 1:
+    if len(factors) + (factor is not None) > 1:
         raise HeadingError(
             f'the coverage factor of "{named}" is stated more than once; keep only one'
         )
-    if not factors and uncertainty_kind.factor is None:
+    if not factors and factor is None:
         raise HeadingError(
             f'"{named}" has no coverage factor; add a column k, or write it in the heading, as in'
             f" expanded_uncertainty (k=2) [{unit}]"
         )
-    return column | {
-        "k": HeadedColumn(factors[0] if factors else -1, constant=uncertainty_kind.factor)
-    }
+    return column | {"k": HeadedColumn(factors[0] if factors else -1, constant=factor)}
 
 
 def _refuse_expanded(column: HeadedColumn, cells: Sequence[str]) -> None:
@@ -267,8 +263,8 @@ def _refuse_expanded(column: HeadedColumn, cells: Sequence[str]) -> None:
     :raises HeadingError: it does.
     """
     cell = cells[column.place][:LONGEST] if column.place >= 0 else ""
-    uncertainty_kind = headed_uncertainty(cell, heading)
-    if uncertainty_kind is not None and uncertainty_kind.kind == "expanded":
+    headed = headed_uncertainty(cell, heading)
+    if headed is not None and headed[0] == "expanded":
         raise HeadingError(
             f'"{shorten(cell)}" is an expanded uncertainty, and readings: columns: u names standard'
             " uncertainties; remove u there: the heading suffices"
@@ -293,7 +289,7 @@ def numbered_columns(words: Vocabulary, count: int) -> Headings:
 def _stated_roles(cells: Sequence[str], words: Vocabulary) -> dict[str, HeadedColumn]:
     return {
         role: _stated_column(name, cells)
-        for role in (*TEXTS, "u", "diameter")
+        for role in (*TEXTS, "u")
         if (name := getattr(words.stated, role, None)) is not None
     }
 

@@ -87,16 +87,15 @@ def run(options: Namespace) -> int:
     report = read_report(
         options.reports, experiment, options.name, options.form, options.unit, options.circles
     )
-    imported = report.imported
     if str(options.output) == "-":
-        imported.write(sys.stdout, options.uncertainty)
+        report.write(sys.stdout, options.uncertainty)
     else:
-        print_to = text_writer(lambda stream: imported.write(stream, options.uncertainty))
+        print_to = text_writer(lambda stream: report.write(stream, options.uncertainty))
         if not write(options, {options.output: print_to}):
             return 0
     for line in report.told:
         note(options, line)
     for line in report.remarks:
         complain(line)
-    note(options, f"{len(imported.readings)} readings written to {options.output}; {imported.key}")
+    note(options, f"{len(report.readings)} readings written to {options.output}; {report.key}")
     return 0

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TextIO
 
 import numpy as np
+from ballplate.presentation import Data, Result, picked
 from ballplate.simulator.design import Design
 from ballplate.simulator.estimation import FEWEST_POINTS, SphereFit, closest_sphere
 from ballplate.simulator.experiment import Coordinate
@@ -67,21 +68,24 @@ class ImportedReading:
     across: int = -1
 
 
-@dataclass(frozen=True)
-class ImportedReadings:
-    """Readings of reports, and notes on how they were read.
+@dataclass(frozen=True, eq=False, repr=False)
+class ReadReport(Result):
+    """Readings of reports, and notes on how they were read; `to_frame` is a table that `fit`
+    accepts.
 
-    `told` lists per file features used and skipped, `remarks` are further notes, and `coordinates`
-    is the entry `readings: {coordinates: …}` of the experiment.
+    `told` lists features used and skipped in each report, `remarks` are further notes, and
+    `coordinates` is the entry `readings: {coordinates: …}` of the experiment.
     """
 
+    label: str
     readings: tuple[ImportedReading, ...]
     told: tuple[str, ...]
     remarks: tuple[str, ...]
     coordinates: Coordinate
     dimension: int = 3
+    title: str = "readings of reports of measuring programs"
 
-    def columns(self, uncertainties: bool = False) -> dict[str, list[str] | list[float]]:
+    def table(self, uncertainties: bool = False) -> dict[str, list[str] | list[float]]:
         """Columns of a table of readings, in millimetres, NaN for a co-ordinate that is not read;
         without probes if no report names any.
         """
@@ -106,7 +110,7 @@ class ImportedReadings:
         for line in (*self.told, self.key):
             stream.write(f"# {line}\n")
         writer = CsvWriter(stream)
-        columns = self.columns(uncertainties)
+        columns = self.table(uncertainties)
         writer.writerow(list(columns))
         for row in zip(*columns.values(), strict=True):
             writer.writerow(["" if cell != cell else cell for cell in row])
@@ -118,6 +122,35 @@ class ImportedReadings:
             "these are centres of balls; say so in the experiment, readings: {coordinates:"
             f' {self.coordinates}}}, or with fit --coordinates "{self.coordinates}"'
         )
+
+    def headline(self) -> str:
+        return f"{len(self.readings)} readings, {self.coordinates}"
+
+    def lines(self) -> list[str]:
+        return [*self.told, self.key]
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        return self.remarks
+
+    def rows(self) -> list[Data]:
+        columns = self.table()
+        return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+    def data(self) -> Data:
+        return {
+            "experiment": self.label,
+            **picked(self, "coordinates", "told", "remarks"),
+            "readings": [
+                {
+                    **picked(reading, "position", "ball"),
+                    "probe": reading.probe or None,
+                    "centre": reading.centre[: self.dimension],
+                    "uncertainty": reading.uncertainty,
+                }
+                for reading in self.readings
+            ],
+        }
 
 
 @dataclass(frozen=True)
@@ -173,9 +206,7 @@ class _Taken:
         return replace(feature, centre=(x, y, z)), fit
 
 
-def report_readings(
-    paths: Sequence[Path | GivenText], settings: ImportSettings
-) -> ImportedReadings:
+def report_readings(paths: Sequence[Path | GivenText], settings: ImportSettings) -> ReadReport:
     """Return readings of reports whose features have names by a rule (see `feature_names`).
 
     :raises ExperimentError: a file cannot be read, is of unknown format or invalid, or has no
@@ -219,8 +250,13 @@ def report_readings(
     remarks += _repeated(readings)
     coordinates: Coordinate = "part" if systems == {"part"} else "ball centres"
     dimension = 3 if settings.design is None else settings.design.dimension
-    return ImportedReadings(
-        tuple(readings), tuple(notes), tuple(dict.fromkeys(remarks)), coordinates, dimension
+    return ReadReport(
+        Path(str(paths[0])).stem,
+        tuple(readings),
+        tuple(notes),
+        tuple(dict.fromkeys(remarks)),
+        coordinates,
+        dimension,
     )
 
 

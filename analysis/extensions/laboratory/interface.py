@@ -15,7 +15,7 @@ from ballplate.simulator.experiment import Experiment
 from ballplate.simulator.inputs import ensure_one_of, ensure_path, ensure_type
 
 if TYPE_CHECKING:
-    from .imported_result import ReadReport
+    from .imported import ReadReport
 
 
 def read_report(
@@ -44,7 +44,6 @@ def read_report(
 
     from .formats.registered import FORMATS
     from .imported import ImportSettings, report_readings
-    from .imported_result import ReadReport
 
     paths = [reports] if isinstance(reports, str | os.PathLike) else list(reports)
     for path in paths:
@@ -64,5 +63,4 @@ def read_report(
     settings = ImportSettings(
         *(design, rule, form, factor, circles, stated.encoding), stated.probes or {}
     )
-    imported = report_readings([Path(path) for path in paths], settings)
-    return ReadReport(Path(paths[0]).stem, imported)
+    return report_readings([Path(path) for path in paths], settings)

@@ -16,21 +16,33 @@ from .length_ratios import IMPOSSIBLE
 EXPLAINED = 0.1
 AGREEMENT = 0.01
 
+# What is read so many times too large.
+UNITS = {
+    25.4: "millimetres that are read as inches",
+    1 / 25.4: "inches that are read as millimetres",
+    10.0: "millimetres that are read as centimetres",
+    0.1: "centimetres that are read as millimetres",
+    1000.0: "a unit a thousand times smaller",
+    0.001: "a unit a thousand times larger",
+}
+
 
 def words_of_size(design: Design, x: Array) -> str:
     """Return the factors by which a plate is larger than drawn in all positions, from scale
     readings x (readings, d), and what to do; empty if there is no such plate.
     """
-    places = x + design.probes.offsets[design.readings.probe]
+    readings = design.readings
     for artefact in np.flatnonzero(design.artefacts.is_plate).tolist():
         balls = design.balls.places[design.balls.of(artefact)]
         axes = np.flatnonzero(np.ptp(balls, axis=0))
         factors = np.array(
             [
                 factor
-                for k, rows, nominal in read_in_positions(design, design.readings)
+                for k, rows, nominal in read_in_positions(design, readings)
                 if design.positions.artefact[k] == artefact
-                for factor in _factors(nominal, nominal[:, axes], places[rows])
+                for probe in np.unique(readings.probe[rows])
+                for own in [readings.probe[rows] == probe]
+                for factor in _factors(nominal[own], nominal[own][:, axes], x[rows[own]])
             ]
         )
         # Comparisons with NaN are false.
@@ -44,6 +56,12 @@ def words_of_size(design: Design, x: Array) -> str:
             parts = [f"{text} in {AXIS_NAMES[k]}" for text, k in zip(parts, axes, strict=True)]
         else:
             del parts[1:]
+        for ratio, unit in UNITS.items():
+            if (abs(factor / ratio - 1.0) < AGREEMENT).all():
+                return (
+                    f"all positions fit a {name} {parts[0]}, as if lengths are in {unit}: correct"
+                    f" the unit of the readings, or artefacts.{name}"
+                )
         pitches = [len(np.unique(np.round(balls[:, k], 9))) - 1 for k in axes]
         is_pitch = (abs(factor / pitches - 1.0) < AGREEMENT).all()
         return (

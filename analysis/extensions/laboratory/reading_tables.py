@@ -15,10 +15,8 @@ from ballplate.simulator.inputs import (
     FileRow,
     GivenText,
     Message,
-    format_length,
     header_names,
     header_texts,
-    listing,
     refused,
 )
 from ballplate.simulator.machines import Array
@@ -41,20 +39,12 @@ from .name_matching import with_known_names
 from .uncertainty_headings import headed_uncertainty
 from .workbooks import workbook_tables
 
-# A diameter is told that is further from others of its ball than so many times their usual
-# distance, and than this (m).
-TIMES_USUAL = 10.0
-LEAST_DEVIATION = 1e-6
-# Readings of a ball that its median diameter is of.
-ENOUGH = 3
-
 
 def any_source_rows(
     tables_read: Sequence[SourceText],
     design: Design,
     settings: ReadingsSettings,
     messages: list[Message],
-    is_possible: Callable[[Array], bool],
     units: Units,
     empty: Collection[str] = (),
 ) -> SourceRows:
@@ -79,9 +69,7 @@ def any_source_rows(
 
     d = design.dimension
     tables = [
-        any_table_rows(
-            table_read, names, settings, messages, is_possible, d, units, empty, of_report
-        )
+        any_table_rows(table_read, names, settings, messages, d, units, empty, of_report)
         for table_read in tables_read
     ]
     if messages:
@@ -99,7 +87,6 @@ def any_source_rows(
         from .report_sources import with_coordinates
 
         settings, notes = with_coordinates(settings, sources, tables)
-    diameters = [d for table in tables for d in table.diameters]
 
     def places(rows_of_source: Sequence[FileRow]) -> Array:
         return _places(rows_of_source, design, settings)
@@ -113,8 +100,6 @@ def any_source_rows(
         texts = (*names_found.asked, *told)
         raise ExperimentError([rows[0].mark.message("", text) for text in texts])
     notes_of_all = [*(text for table in tables for text in table.told), *notes]
-    if len(diameters) == len(rows):
-        notes_of_all += _about_diameters(named, np.array(diameters))
     return SourceRows(named, (*notes_of_all, *names_found.told), settings)
 
 
@@ -137,7 +122,6 @@ def any_table_rows(
     names: Mapping[str, Sequence[str]],
     settings: ReadingsSettings,
     messages: list[Message],
-    is_possible: Callable[[Array], bool],
     dimension: int,
     units: Units,
     empty: Collection[str] = (),
@@ -166,7 +150,7 @@ def any_table_rows(
         axes, tuple(names["probe"]), tuple(names["position"]), settings.columns, units, empty
     )
     try:
-        return read_any_table(text, encoding, words, settings, is_possible)
+        return read_any_table(text, encoding, words, settings)
     except ExperimentError as error:
         if (report := of_report(source, text)) is not None:
             return report
@@ -193,39 +177,6 @@ def _places(rows: Sequence[FileRow], design: Design, settings: ReadingsSettings)
     index = {name: k for k, name in enumerate(design.probes.names)}
     probe = np.array([index.get(row.texts[2], -1) for row in rows])
     return x + np.where((probe >= 0)[:, None], added[probe], 0.0)
-
-
-def _about_diameters(rows: Sequence[FileRow], diameters: Array) -> list[str]:
-    """In words which diameters of balls as measured are odd; nothing where none is stated."""
-    with_diameter = np.flatnonzero(~np.isnan(diameters))
-    if not len(with_diameter):
-        return []
-    by_ball: dict[str, list[int]] = {}
-    for i in with_diameter.tolist():
-        by_ball.setdefault(rows[i].texts[1], []).append(i)
-    usual = float(np.median(diameters[with_diameter]))
-    off = np.zeros(len(rows))
-    for diameters_of_ball in by_ball.values():
-        off[diameters_of_ball] = diameters[diameters_of_ball] - (
-            np.median(diameters[diameters_of_ball]) if len(diameters_of_ball) >= ENOUGH else usual
-        )
-    limit = max(
-        TIMES_USUAL * 1.4826 * float(np.median(np.abs(off[with_diameter]))), LEAST_DEVIATION
-    )
-    odd = with_diameter[np.abs(off[with_diameter]) > limit]
-    odd = odd[np.argsort(-np.abs(off[odd]), kind="stable")]
-    text = f"sphere diameters, {format_length(float(f'{usual:.6g}'))} in the middle, are not used"
-    if not len(odd):
-        return [f"{text}; none is odd"]
-    named = listing(
-        (
-            f"{rows[i].texts[1]} in {rows[i].texts[0]} (line {rows[i].mark.line}):"
-            f" {format_length(float(f'{diameters[i]:.6g}'))}"
-            for i in odd.tolist()
-        ),
-        5,
-    )
-    return [f"{text}; odd: {named}: check these readings for dirt, or for another feature"]
 
 
 class OtherTables:

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Literal
 
 Kind = Literal["standard", "expanded", "unclear"]
@@ -32,13 +31,8 @@ _FACTOR = re.compile(
 )
 
 
-@dataclass(frozen=True)
-class HeadedUncertainty:
-    """What a heading says of an uncertainty: which it is, its coverage factor, and its unit."""
-
-    kind: Kind
-    factor: str | None
-    unit: str | None
+# What a heading says of an uncertainty: which it is, its coverage factor, and its unit.
+HeadedUncertainty = tuple[Kind, str | None, str | None]
 
 
 def headed_uncertainty(
@@ -54,11 +48,11 @@ def headed_uncertainty(
     factor = None if match is None else match[1].replace(",", ".")
     name, unit = heading(remainder)
     if name in EXPANDED:
-        return HeadedUncertainty("expanded", factor, unit)
+        return "expanded", factor, unit
     is_capital = name == "u" and remainder.lstrip().startswith("U")
     if name in UNCLEAR or is_capital:
-        return HeadedUncertainty("unclear" if factor is None else "expanded", factor, unit)
+        return "unclear" if factor is None else "expanded", factor, unit
     if name in STANDARD:
         is_standard = factor is None or float(factor) == 1.0
-        return HeadedUncertainty("standard" if is_standard else "unclear", factor, unit)
+        return "standard" if is_standard else "unclear", factor, unit
     return None

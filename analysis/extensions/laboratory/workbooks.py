@@ -103,9 +103,6 @@ def _cells_in_ranges(archive: ZipFile) -> Iterator[int]:
 
 def _text(value: object) -> str:
     text = "" if value is None else " ".join(str(value).split())
-    if isinstance(value, float) and "e" not in text:
-        # With three decimals, other tables may mean thousands; a fourth rules this out.
-        return f"{text}0"
     return f'''"{text.replace('"', '""')}"''' if '"' in text else text
 
 

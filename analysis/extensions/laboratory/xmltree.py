@@ -7,7 +7,7 @@ or name other files, is refused, as is what is larger or deeper than any report 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from xml.parsers import expat
 
@@ -43,16 +43,19 @@ _REMEDIES = {
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Element:
-    """An element: its name without prefix, its namespace, and its own text without white space
-    about it.
-    """
+    """An element: its name without prefix, its namespace, and the pieces of its own text."""
 
     mark: Mark
     namespace: str
     name: str
     attributes: dict[str, str]
-    children: tuple[Element, ...]
-    text: str
+    children: list[Element] = field(default_factory=list)
+    texts: list[str] = field(default_factory=list)
+
+    @property
+    def text(self) -> str:
+        """Its own text without white space about it."""
+        return "".join(self.texts).strip()
 
     def all(self, *names: str) -> Iterator[Element]:
         """Elements at a path of names below this one, in their order."""
@@ -121,24 +124,12 @@ def parse_xml(content: bytes, file: str, encoding: str | None = None) -> Element
     return builder.roots[0]
 
 
-@dataclass(frozen=True, eq=False)
-class _Open:
-    """An element whose end has not been seen."""
-
-    mark: Mark
-    namespace: str
-    name: str
-    attributes: dict[str, str]
-    children: list[Element]
-    texts: list[str]
-
-
 class _Builder:
     """Makes the tree of what a parser says."""
 
     def __init__(self, file: str, encoding: str | None) -> None:
         self.file = file
-        self.open: list[_Open] = []
+        self.open: list[Element] = []
         self.roots: list[Element] = []
         self.count = 0
         self.parser = expat.ParserCreate(encoding, _SEPARATOR)
@@ -168,20 +159,12 @@ class _Builder:
         plain_attributes = {
             key.rpartition(_SEPARATOR)[2]: value for key, value in attributes.items()
         }
-        self.open.append(_Open(self._mark(), namespace, local, plain_attributes, [], []))
+        element = Element(self._mark(), namespace, local, plain_attributes)
+        (self.open[-1].children if self.open else self.roots).append(element)
+        self.open.append(element)
 
     def _end(self, _: str) -> None:
-        element = self.open.pop()
-        text = "".join(element.texts).strip()
-        made = Element(
-            element.mark,
-            element.namespace,
-            element.name,
-            element.attributes,
-            tuple(element.children),
-            text,
-        )
-        (self.open[-1].children if self.open else self.roots).append(made)
+        self.open.pop()
 
     def _text(self, text: str) -> None:
         if self.open:

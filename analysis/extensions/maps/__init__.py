@@ -1,1 +1,1 @@
-"""Error maps used: corrected points, error curves, volumetric errors, conversion, comparison."""
+"""Error maps used: corrected points, error curves, volumetric errors, comparison."""

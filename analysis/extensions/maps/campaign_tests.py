@@ -56,8 +56,8 @@ Roots = tuple[Array, Array]
 
 @dataclass(frozen=True)
 class JointDifference:
-    """Joint test of differences: `statistic` is their sum of squares, weighted with their
-    covariance, of `dimensions` independent ones.
+    """Joint test of differences, `what` they are of: `statistic` is their sum of squares, weighted
+    with their covariance, of `dimensions` independent ones.
 
     `degrees_of_freedom` are Welch's for the mean share of both campaigns; `p` is the p-value.
     Common errors fix `fixed` directions, which are not tested; `held` is the largest difference
@@ -70,6 +70,7 @@ class JointDifference:
     p: float
     fixed: int = 0
     held: float = 0.0
+    what: str = ""
 
 
 def with_common(roots: Roots, common: Array, scatters: SigmaPair) -> Roots:

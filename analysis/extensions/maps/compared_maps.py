@@ -27,6 +27,10 @@ MOTIONS = {
 }
 
 
+class NotComparableError(ValueError):
+    """Two maps with no common ground for what is asked."""
+
+
 @dataclass(frozen=True, eq=False)
 class MappedValues:
     """Functions (m,) with `values`, a square `root` (m, r) of their covariance, their changes

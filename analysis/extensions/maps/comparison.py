@@ -13,10 +13,10 @@ from ballplate.simulator.design import Volume
 from ballplate.simulator.geometry import AXIS_NAMES, even_grid
 from ballplate.simulator.machines import Array, ErrorModel, HasLines, Integers
 
-from .campaign_tests import orthonormal
-from .compared_maps import MOTIONS, ComparedMap, motions
-from .normalised_errors import FigureGroup, JointTest, ValueDifference
-from .plates import PlateDifference, plate_differences
+from .campaign_tests import JointDifference, orthonormal
+from .compared_maps import MOTIONS, ComparedMap, NotComparableError, motions
+from .normalised_errors import FigureGroup, ValueDifference
+from .plates import plate_differences
 
 # Places along an axis at which error functions are compared, by fractions of it.
 PLACES = np.linspace(0.1, 1.0, 10)
@@ -26,25 +26,6 @@ LEAST_POINTS = 150
 OF_CORNERS = {1: "edges", 2: "face diagonals", 3: "body diagonals"}
 # What makes error functions of two models the same ones.
 SAME = ("arrangement", "lower", "upper", "origin", "full_rotations", "spatial", "z", "chain")
-
-
-@dataclass(frozen=True)
-class ComparisonSettings:
-    """Settings of a comparison: `coverage_factor`, `grid` points along each axis, and the probe."""
-
-    coverage_factor: float = 2.0
-    grid: int = 4
-    probe: str | None = None
-
-
-@dataclass(frozen=True, eq=False)
-class FunctionDifference:
-    """Differences of an error function along its axis, with their joint test."""
-
-    name: str
-    axis: str
-    figures: FigureGroup
-    test: JointTest | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,32 +51,26 @@ class MapComparison:
     motion: FrameMotion
     lengths: tuple[FigureGroup, ...]
     places: FigureGroup
-    functions: tuple[FunctionDifference, ...]
+    functions: tuple[FigureGroup, ...]
     why_no_functions: str
-    plates: tuple[PlateDifference, ...]
-    test: JointTest | None
+    plates: tuple[FigureGroup, ...]
+    test: JointDifference | None
 
     @property
     def groups(self) -> tuple[FigureGroup, ...]:
         """All groups of values, in printed order."""
-        of_functions = (function.figures for function in self.functions)
-        return (
-            *self.lengths,
-            self.places,
-            *of_functions,
-            *(plate.figures for plate in self.plates),
-        )
-
-
-class NotComparableError(ValueError):
-    """Two maps with no common ground for a comparison."""
+        return *self.lengths, self.places, *self.functions, *self.plates
 
 
 @single_threaded
 def compared(
-    first: ComparedMap, second: ComparedMap, settings: ComparisonSettings
+    first: ComparedMap,
+    second: ComparedMap,
+    coverage_factor: float = 2.0,
+    grid: int = 4,
+    probe: str | None = None,
 ) -> MapComparison:
-    """Compare two maps.
+    """Compare two maps at `grid` points along each axis, with a probe, by default theirs.
 
     :raises NotComparableError: machines of other dimensions or volumes, or no common probe.
     """
@@ -104,9 +79,9 @@ def compared(
         raise NotComparableError(f"the machines have {axes} axes; compare maps of the same machine")
     first, second = _linearised_alike(first, second)
     volume = _common_volume(first, second)
-    probe, offsets = _offsets(first, second, settings.probe)
+    probe, offsets = _offsets(first, second, probe)
     scatters = first.scatter, second.scatter
-    k = settings.coverage_factor
+    k = coverage_factor
 
     def difference_at(points: Array, offset: Array) -> ValueDifference:
         mapped_first, mapped_second = (
@@ -114,7 +89,7 @@ def compared(
         )
         return ValueDifference(mapped_first, mapped_second, scatters)
 
-    points = even_grid(volume.lower, volume.upper, [settings.grid] * len(volume.lower))
+    points = even_grid(volume.lower, volume.upper, [grid] * len(volume.lower))
     difference, offset = difference_at(points, offsets[probe]), offsets[probe]
     middle = points.mean(axis=0)
     moving = motions(points - middle).reshape(points.size, -1)
@@ -237,7 +212,7 @@ def _lengths(
 
 def _functions(
     first: ComparedMap, second: ComparedMap, coverage_factor: float
-) -> tuple[tuple[FunctionDifference, ...], str]:
+) -> tuple[tuple[FigureGroup, ...], str]:
     """Error functions that both maps have, or why they are not compared."""
     names = [
         list(dict.fromkeys(p.function for p in side.model.parameters)) for side in (first, second)
@@ -267,7 +242,7 @@ def _functions(
             name, parameter.unit, words, coverage_factor
         )
         test = ValueDifference(first_dense, second_dense, scatters).joint_test(name)
-        differences.append(FunctionDifference(name, parameter.meaning, figures, test))
+        differences.append(replace(figures, meaning=parameter.meaning, test=test))
     why = "" if differences else "the models have no error functions of one variable"
     return tuple(differences), why
 
@@ -288,7 +263,7 @@ def _have_same_functions(model: ErrorModel, other_model: ErrorModel) -> bool:
 
 def _whole(
     difference_at: Any, volume: Volume, offsets: dict[str, Array], count: int
-) -> JointTest | None:
+) -> JointDifference | None:
     """Return the joint test of errors through the volume with all common probes, independent of the
     frame and of probe offsets.
     """

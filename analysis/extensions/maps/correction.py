@@ -21,39 +21,19 @@ from ballplate.results import few_degrees_of_freedom, freedom_words, left_out_wo
 from ballplate.simulator.computing import single_threaded
 from ballplate.simulator.design import Flags, Tasks
 from ballplate.simulator.geometry import AXIS_NAMES
-from ballplate.simulator.inputs import CsvWriter, Target, listing, number_of
+from ballplate.simulator.inputs import CsvWriter, listing, number_of
 from ballplate.simulator.machines import Array
 from ballplate.simulator.maps import FittedMap, verdict_data, verdict_line
 from ballplate.uncertainty import stretches
 
 from .corrected_points import corrected_with_blocks, corrected_with_root, tips
-from .mapped_lengths import mapped_lengths
+from .mapped_lengths import CorrectedLength, mapped_lengths
 from .point_files import GivenPoints
 
 # Points and lengths that the text shows.
 SHOWN = 20
 # Co-ordinates of a covariance, whose size grows with their square.
 MOST_CO_ORDINATES = 2000
-
-
-@dataclass(frozen=True)
-class CorrectedLength:
-    """A length on the corrected machine, with `read`, the length by scales and stated probe
-    offsets, and its `target`, if any; metres. The standard uncertainty is NaN if undetermined.
-    """
-
-    name: str
-    read: float
-    value: float
-    standard_uncertainty: float
-    target: Target | None = None
-
-    @property
-    def is_met(self) -> bool | None:
-        """True if the uncertainty is within the target; None without a target."""
-        if self.target is None:
-            return None
-        return bool(self.standard_uncertainty <= self.target.at(self.value))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -141,7 +121,7 @@ class Correction(Result):
     @property
     def warnings(self) -> tuple[str, ...]:
         """Warnings: extrapolation, few degrees of freedom, effects not applied."""
-        fitted, cautions = self.fitted, [self.fitted.known_lack_of_fit.caution]
+        fitted, cautions = self.fitted, [self.fitted.lack_of_fit.caution]
         outside = np.flatnonzero(self.outside)
         if len(outside):
             words = listing((self.given.name(int(i)) for i in outside), 3)
@@ -321,23 +301,6 @@ def correction(
     places, blocks = corrected_with_blocks(fitted, given.points, given.probes)
     blocks = blocks + np.diag((scatter * fitted.repeatability) ** 2)
     places = np.where(np.isnan(np.diagonal(blocks, axis1=1, axis2=2)), np.nan, places)
-    corrected_lengths: tuple[CorrectedLength, ...] = ()
-    if lengths is not None and len(lengths.names):
-        ends = lengths.points.reshape(-1, fitted.dimension)
-        pairs = np.arange(len(ends)).reshape(-1, 2)
-        mapped = mapped_lengths(fitted, ends, lengths.probes.ravel(), pairs, scatter)
-        values = np.where(np.isnan(mapped.standard_uncertainties), np.nan, mapped.values)
-        uncertainties = mapped.standard_uncertainties.tolist()
-        corrected_lengths = tuple(
-            CorrectedLength(*figures)
-            for figures in zip(
-                lengths.names,
-                mapped.read.tolist(),
-                values.tolist(),
-                uncertainties,
-                lengths.targets,
-                strict=True,
-            )
-        )
+    mapped = () if lengths is None else tuple(mapped_lengths(fitted, lengths, scatter))
     factor = coverage_factor or fitted.coverage_factor
-    return Correction(fitted, given, places, blocks, corrected_lengths, factor, scatter)
+    return Correction(fitted, given, places, blocks, mapped, factor, scatter)

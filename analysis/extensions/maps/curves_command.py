@@ -19,8 +19,7 @@ from .fitted_argument import FITTED, fitted_map
 
 if TYPE_CHECKING:
     from .error_curves_result import ErrorCurves
-    from .fitted_errors_result import FittedErrorMap
-    from .volumetric_results import MachineErrors
+    from .error_map import ErrorMap
 
 DESCRIPTION = (
     "Print every error function of a map file (fit -o) along its axis with its expanded"
@@ -76,7 +75,7 @@ def run(options: Namespace) -> int:
     return 0
 
 
-def show_errors(options: Namespace, errors: MachineErrors | FittedErrorMap | ErrorCurves) -> None:
+def show_errors(options: Namespace, errors: ErrorMap | ErrorCurves) -> None:
     """Print notes and errors, these in the chosen format."""
     for note in errors.notes:
         complain(note)

@@ -11,13 +11,12 @@ from ballplate.cli import (
     add_json,
     add_output,
     add_picture,
+    coverage_factor,
     day,
     show,
     whole,
     write,
 )
-
-from .lengths_command import coverage_factor
 
 DESCRIPTION = (
     "Compare two campaigns, or a campaign with an expected map: lengths, errors at points of the"
@@ -112,9 +111,8 @@ def run(options: Namespace) -> int:
     from ballplate.cli import complain
     from ballplate.simulator.inputs import QuantityError, Target, parse_length_function
 
-    from .comparison import ComparisonSettings, NotComparableError
+    from .compared_maps import NotComparableError
     from .fit_files import fit_of_file
-    from .shared_certificates import NothingSharedError
     from .sources import map_difference
 
     k = options.coverage_factor
@@ -129,12 +127,14 @@ def run(options: Namespace) -> int:
         )
         difference = map_difference(
             (first, second),
-            ComparisonSettings(k, options.grid, options.probe),
-            options.shared is not None,
-            standard,
-            (options.dates[0], options.dates[1]),
+            coverage_factor=k,
+            grid=options.grid,
+            probe=options.probe,
+            shared=options.shared is not None,
+            stated=standard,
+            dates=(options.dates[0], options.dates[1]),
         )
-    except (NotComparableError, NothingSharedError, QuantityError) as error:
+    except (NotComparableError, QuantityError) as error:
         raise UsageError(error) from None
     write(options, {options.output: difference.to_csv, options.plot: difference.plot})
     show(options, difference)

@@ -18,9 +18,7 @@ from ballplate.presentation import (
     table_csv,
     table_lines,
 )
-from ballplate.simulator.experiment import load_machine
 from ballplate.simulator.geometry import AXIS_NAMES
-from ballplate.simulator.inputs import Message
 from ballplate.simulator.maps import FittedMap
 
 from .error_functions import (
@@ -31,10 +29,8 @@ from .error_functions import (
     error_functions,
     stated_functions,
 )
-from .fitted_errors_result import map_cautions
-from .fitted_tables import UNDETERMINED, expanded, head_lines, map_data
-from .volumetric_errors import Volumetric
-from .volumetric_tables import CONVENTION
+from .error_map import UNDETERMINED, expanded
+from .error_sources import ErrorSource, source_of_machine, source_of_map
 
 ARCSECOND = np.pi / 180.0 / 3600.0
 
@@ -44,29 +40,22 @@ MOST_LINES = 12
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ErrorCurves(Result):
-    """The error functions of a machine, its squareness errors and its other numbers.
+    """The error functions of a machine, its squareness errors and its other numbers."""
 
-    `band` names what stands beside values: U, expanded uncertainties of the estimates of a map, of
-    the coverage factor `k`, or standard deviations of the random part that a machine file states.
-    `head` are lines of text about the machine, and `about` is the same as data.
-    """
-
-    label: str
-    name: str
+    source: ErrorSource
     functions: ErrorFunctions
-    k: float
-    band: str
-    head: tuple[str, ...]
-    about: Data
-    cautions: tuple[str, ...]
+
+    @property
+    def label(self) -> str:
+        return self.source.label
 
     @property
     def title(self) -> str:
-        return self.name
+        return self.source.title
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        return self.cautions
+        return self.source.cautions
 
     def headline(self) -> str:
         names = dict.fromkeys(curve.name for curve in self.functions.curves)
@@ -76,19 +65,19 @@ class ErrorCurves(Result):
         return f"{words}, {len(open_)} functions undetermined" if open_ else words
 
     def lines(self) -> list[str]:
-        functions, lines = self.functions, [*self.head]
+        functions, k = self.functions, self.source.coverage_factor
+        lines = [*self.source.lines]
         lines[-1] += ", at each position separately"
         if functions.curves:
-            lines += ["", *_curve_table(functions.curves, self.k, self.band)]
+            lines += ["", *_curve_table(functions.curves, k)]
         if functions.squareness:
-            lines += ["", *_angle_table(functions.squareness, self.k, self.band)]
+            lines += ["", *_angle_table(functions.squareness, k)]
         if functions.numbers:
-            lines += ["", *_number_table(functions.numbers, self.k, self.band)]
+            lines += ["", *_number_table(functions.numbers, k)]
         return lines
 
     def data(self) -> Data:
-        key = "expanded_uncertainty" if self.band == "U" else self.band
-        data = {**self.about}
+        k, data = self.source.coverage_factor, {**self.source.data}
         data["functions"] = [
             {
                 "error": curve.name,
@@ -97,7 +86,8 @@ class ErrorCurves(Result):
                 "axis": None if curve.axis is None else AXIS_NAMES[curve.axis],
                 "position": curve.positions,
                 "value": curve.values,
-                key: self.k * curve.uncertainties,
+                "expanded_uncertainty": k * curve.uncertainties,
+                "source": curve.source or None,
             }
             for curve in self.functions.curves
         ]
@@ -106,7 +96,7 @@ class ErrorCurves(Result):
                 {
                     "error": error.name,
                     **picked(error, "meaning", "unit", "value"),
-                    key: self.k * error.standard_uncertainty,
+                    "expanded_uncertainty": k * error.standard_uncertainty,
                     "source": error.source,
                 }
                 for error in getattr(self.functions, part)
@@ -117,8 +107,9 @@ class ErrorCurves(Result):
         """One row for each position of each curve, then one for each number; in metres, radians and
         ratios.
         """
+        k = self.source.coverage_factor
         rows = [
-            _row(curve.name, curve.line, x, value, self.k * u, self.k, curve.unit)
+            _row(curve.name, curve.line, x, value, k * u, k, curve.unit)
             for curve in self.functions.curves
             for x, value, u in zip(
                 *(part.tolist() for part in (curve.positions, curve.values, curve.uncertainties)),
@@ -132,8 +123,8 @@ class ErrorCurves(Result):
                 "",
                 np.nan,
                 error.value,
-                self.k * error.standard_uncertainty,
-                self.k,
+                k * error.standard_uncertainty,
+                k,
                 error.unit,
             )
             for error in numbers
@@ -149,7 +140,7 @@ class ErrorCurves(Result):
                 row["position"] * (1.0 if row["error"] in fractions else 1e3)
             ),
             "value": lambda row: 1e6 * row["value"],
-            self.band: lambda row: 1e6 * row["U"],
+            "U": lambda row: 1e6 * row["U"],
             "k": lambda row: f"{row['k']:g}",
             "unit": lambda row: ascii_units(SHOWN[row["unit"]]),
         }
@@ -164,11 +155,7 @@ def error_curves(
     :raises ValueError: there is none of a name.
     """
     functions = error_functions(fitted, names, positions)
-    head, cautions = tuple(head_lines(label, fitted)), map_cautions(fitted)
-    about = map_data(label, fitted)
-    return ErrorCurves(
-        *(label, fitted.title, functions, fitted.coverage_factor, "U", head, about, cautions)
-    )
+    return ErrorCurves(source_of_map(fitted, label), functions)
 
 
 def machine_curves(
@@ -180,14 +167,8 @@ def machine_curves(
     :raises ExperimentError: the file is wrong.
     :raises ValueError: there is none of a name.
     """
-    doubts: list[Message] = []
-    built = Volumetric(load_machine(file, doubts))
-    title, functions = built.machine.title, stated_functions(built, names, positions)
-    head = (f"{file.stem}: {title}", CONVENTION, "random: one standard deviation")
-    about = {"machine": title, "convention": CONVENTION}
-    return ErrorCurves(
-        file.stem, title, functions, 1.0, "random", head, about, tuple(map(str, doubts))
-    )
+    built, source = source_of_machine(file)
+    return ErrorCurves(source, stated_functions(built, names, positions))
 
 
 def _row(
@@ -197,11 +178,11 @@ def _row(
     return dict(zip(keys, (name, line, position, value, u, k, unit), strict=True))
 
 
-def _curve_table(curves: Sequence[FunctionCurve], k: float, band: str) -> list[str]:
+def _curve_table(curves: Sequence[FunctionCurve], k: float) -> list[str]:
     """Return one row per curve: range of positions, least and largest value, largest band."""
     heads = ["error", "", "along", "from, mm", "to, mm", "least", "largest"]
-    heads += [f"largest {band}", "unit"]
-    rows, line_counts, omitted = [heads], dict[str, int](), 0
+    heads += ["largest U", "unit", "stated as"]
+    rows, line_counts, omitted = list[list[str]](), dict[str, int](), 0
     for curve in curves:
         line_counts[curve.name] = line_counts.get(curve.name, 0) + 1
         if line_counts[curve.name] > MOST_LINES:
@@ -222,32 +203,35 @@ def _curve_table(curves: Sequence[FunctionCurve], k: float, band: str) -> list[s
             values = [number(1e6 * value, 4) for value in ranges]
             if np.isnan(curve.uncertainties).any():
                 values[2] += " in part"
-        rows.append([curve.name, curve.meaning, along, *ends, *values, SHOWN[curve.unit]])
-    right = [False, False, False, True, True, True, True, True, False]
+        unit = SHOWN[curve.unit]
+        rows.append([curve.name, curve.meaning, along, *ends, *values, unit, curve.source])
+    right = [False, False, False, True, True, True, True, True, False, False]
+    # A map is an estimate throughout.
+    shown = slice(None if any(row[-1] for row in rows) else -1)
     more = [f"({omitted} more lines are in --format csv and --json)"] if omitted else []
-    return [*aligned(rows, right), *more]
+    return [*aligned([row[shown] for row in (heads, *rows)], right[shown]), *more]
 
 
-def _angle_table(numbers: Sequence[EstimatedNumber], k: float, band: str) -> list[str]:
+def _angle_table(numbers: Sequence[EstimatedNumber], k: float) -> list[str]:
     """Squareness errors as angles in two units."""
     columns = [
         ("squareness", "name"),
         ("", "meaning"),
         ("µrad", ("value", "standard_uncertainty")),
-        (band, (lambda estimate: k * estimate.standard_uncertainty, expanded)),
+        ("U", (lambda estimate: k * estimate.standard_uncertainty, expanded)),
         ("arcsec", ("value", "standard_uncertainty")),
-        (band, (lambda estimate: k * estimate.standard_uncertainty / (1e6 * ARCSECOND), expanded)),
+        ("U", (lambda estimate: k * estimate.standard_uncertainty / (1e6 * ARCSECOND), expanded)),
         ("", "source"),
     ]
     return table_lines(columns, numbers, unknown=UNDETERMINED)
 
 
-def _number_table(numbers: Sequence[EstimatedNumber], k: float, band: str) -> list[str]:
+def _number_table(numbers: Sequence[EstimatedNumber], k: float) -> list[str]:
     columns = {
         "error": "name",
         "": "meaning",
         "value": ("value", "standard_uncertainty"),
-        band: (lambda estimate: k * estimate.standard_uncertainty, expanded),
+        "U": (lambda estimate: k * estimate.standard_uncertainty, expanded),
         "unit": "unit",
     }
     return table_lines(columns, numbers, unknown=UNDETERMINED)

@@ -8,9 +8,11 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from ballplate.presentation import SHOWN, number
 from ballplate.simulator.computing import single_threaded
-from ballplate.simulator.inputs import hint
+from ballplate.simulator.inputs import format_length, hint
 from ballplate.simulator.machines import (
+    AXES,
     SQUARENESS_ERRORS,
     Array,
     HasLines,
@@ -20,7 +22,7 @@ from ballplate.simulator.machines import (
 )
 from ballplate.simulator.maps import FittedMap
 
-from .volumetric_errors import Volumetric, along_axes
+from .volumetric_errors import AlongAxis, Volumetric, along_axes
 
 # Positions along each line.
 POSITIONS = 41
@@ -35,7 +37,8 @@ class FunctionCurve:
     """An error function along a line: `values` and standard `uncertainties` (m,) in `unit` at
     `positions` (m,) in metres of its `axis`; NaN where undetermined.
 
-    Without an axis, positions are fractions of the line; `line` names one of several.
+    Without an axis, positions are fractions of the line; `line` names one of several. `source` is
+    how a machine file states it.
     """
 
     name: str
@@ -46,6 +49,7 @@ class FunctionCurve:
     positions: Array
     values: Array
     uncertainties: Array
+    source: str = ""
 
     @property
     def is_undetermined(self) -> bool:
@@ -109,7 +113,8 @@ def stated_functions(
         values = none if along.values is None else along.values
         deviation = none if along.deviation is None else along.deviation
         description = error.name, meaning(error.name), along.unit, "", error.axis
-        curves.append(FunctionCurve(*description, along.positions, values, deviation))
+        stated = _stated_as(along)
+        curves.append(FunctionCurve(*description, along.positions, values, deviation, stated))
     lasting, sizes = built.lasting
     deviations = dict(zip((field.name for field in lasting.fields), sizes.tolist(), strict=True))
     numbers = [
@@ -121,6 +126,23 @@ def stated_functions(
         for parameter, value in built.numbers
     ]
     return _named("machine", curves, numbers, names)
+
+
+def _stated_as(along: AlongAxis) -> str:
+    error, measured = along.error, along.measured
+    if along.values is None:
+        return "random"
+    form = "polynomial" if measured is None else f"table of {len(measured.positions)} points"
+    if measured is not None and measured.order:
+        sigma = number(1e6 * measured.fitted.sigma, 2)
+        curve = "spline" if measured.knots else "polynomial"
+        form = f"{curve} fitted to the {form}, sigma {sigma} {SHOWN[along.unit]}"
+    if error.line is not None and not error.is_rotation:
+        fixed_axes = [k for k in range(3) if k != error.axis]
+        form += " at " + ", ".join(
+            f"{AXES[k]} = {format_length(error.line[k])}" for k in fixed_axes
+        )
+    return form + (f", {error.criterion}" if error.is_straightness else "")
 
 
 def _named(

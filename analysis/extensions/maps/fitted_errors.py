@@ -6,15 +6,12 @@ opposite in sign to the error of indication. The offset of the probe is not part
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-
 import numpy as np
 from ballplate.simulator.computing import single_threaded
 from ballplate.simulator.machines import Array, Integers
 from ballplate.simulator.maps import FittedMap
 
-from .corrected_points import POINTS_AT_ONCE, corrected, drawn_rows, probe_indices, tips
+from .corrected_points import POINTS_AT_ONCE, corrected, drawn_rows, probe_indices
 from .map_places import MapPlaces
 from .realisations import Draws, Realisations, symmetric_root
 from .volumetric_errors import LengthErrors, VolumetricErrors, length_errors
@@ -23,26 +20,11 @@ from .volumetric_errors import LengthErrors, VolumetricErrors, length_errors
 Probed = Integers | int
 
 
-@dataclass(frozen=True, eq=False)
-class ErrorRows:
-    """Derivatives (..., b) of functions by the contents of a map; `drawn`, those on a machine
-    without errors, determine undetermined results, None without any.
+def _rows_of_errors(fitted: FittedMap, points: Array, probes: Probed) -> tuple[Array, Array | None]:
+    """Derivatives (m, d, b) of errors at points (m, d) with probes of indices (m,), or of one, by
+    the contents of a map, and those on a machine without errors, which determine undetermined
+    results, None without any.
     """
-
-    rows: Array
-    drawn: Array | None
-
-    def by(self, change: Callable[[Array], Array]) -> ErrorRows:
-        """Return both changed alike."""
-        return ErrorRows(change(self.rows), None if self.drawn is None else change(self.drawn))
-
-    def uncertainties(self, fitted: FittedMap) -> Array:
-        """Standard uncertainties (...), NaN where undetermined."""
-        return fitted.standard_uncertainties(self.rows, self.drawn)
-
-
-def rows_of_errors(fitted: FittedMap, points: Array, probes: Probed) -> ErrorRows:
-    """Derivatives (m, d, b) of errors at points (m, d) with probes of indices (m,), or of one."""
     columns = fitted.offset_columns[probe_indices(fitted, len(points), probes)]
     indices, axis = np.nonzero(columns >= 0)
     _, rows = corrected(fitted, points, probes)
@@ -50,13 +32,7 @@ def rows_of_errors(fitted: FittedMap, points: Array, probes: Probed) -> ErrorRow
     for array in (rows,) if drawn is None else (rows, drawn):
         # The offset itself is no error of the machine; what the rotations make of it is.
         array[indices, axis, columns[indices, axis]] -= 1.0
-    return ErrorRows(rows, drawn)
-
-
-def errors_of(fitted: FittedMap, points: Array, probes: Probed) -> Array:
-    """Return estimated errors (m, d) at points (m, d), undetermined ones included."""
-    offsets = fitted.probes.offsets[probe_indices(fitted, len(points), probes)]
-    return fitted.model.error(points, fitted.values, offsets) - offsets
+    return rows, drawn
 
 
 @single_threaded
@@ -65,48 +41,39 @@ def fitted_errors(fitted: FittedMap, points: Array, probes: Probed) -> Volumetri
     uncertainties = np.zeros(points.shape)
     for start in range(0, len(points), POINTS_AT_ONCE):
         some = slice(start, start + POINTS_AT_ONCE)
-        rows = rows_of_errors(fitted, points[some], _part(probes, some))
-        uncertainties[some] = rows.uncertainties(fitted)
-    errors = np.where(np.isnan(uncertainties), np.nan, errors_of(fitted, points, probes))
+        rows = _rows_of_errors(fitted, points[some], _part(probes, some))
+        uncertainties[some] = fitted.standard_uncertainties(*rows)
+    offsets = fitted.probes.offsets[probe_indices(fitted, len(points), probes)]
+    errors = fitted.model.error(points, fitted.values, offsets) - offsets
+    errors[np.isnan(uncertainties)] = np.nan
     return VolumetricErrors(points, errors, uncertainties)
 
 
 @single_threaded
 def fitted_lengths(fitted: FittedMap, places: MapPlaces, probe: int) -> LengthErrors:
-    """Return errors of lengths between tips, with stated offsets where the scales place them; both
-    ends use one probe unless they have their own.
-    """
-    first, last = (tips(fitted, *end) for end in length_ends(places, probe))
-    corrected_ends = [corrected(fitted, *end)[0] for end in length_ends(places, probe)]
-    moved = corrected_ends[1] - last - (corrected_ends[0] - first)
-    uncertainties = length_rows(fitted, places, probe).uncertainties(fitted)
+    """Return errors of lengths between scale readings, both ends with one probe."""
+    first, last = places.starts, places.ends
+    starts, ends = (corrected(fitted, points, probe)[0] for points in (first, last))
+    moved = ends - last - (starts - first)
+    uncertainties = fitted.standard_uncertainties(*_length_rows(fitted, places, probe))
     errors = np.where(np.isnan(uncertainties), np.nan, length_errors(first, last, moved))
     nominal = np.linalg.norm(last - first, axis=1)
-    return LengthErrors(places.starts, places.ends, nominal, errors, uncertainties)
+    return LengthErrors(first, last, nominal, errors, uncertainties)
 
 
-def length_ends(places: MapPlaces, probe: int) -> tuple[tuple[Array, Integers], ...]:
-    """Starts and ends (k, d) of lengths, each with the indices (k,) of their probes."""
-    probes = places.length_probes
-    if probes is None:
-        probes = np.full((len(places.starts), 2), probe)
-    return (places.starts, probes[:, 0]), (places.ends, probes[:, 1])
-
-
-def length_rows(fitted: FittedMap, places: MapPlaces, probe: int) -> ErrorRows:
-    """Derivatives (k, b) of lengths."""
-    first, last = length_ends(places, probe)
-    apart = tips(fitted, *last) - tips(fitted, *first)
-    direction = apart / np.linalg.norm(apart, axis=1)[:, None]
+def _length_rows(fitted: FittedMap, places: MapPlaces, probe: int) -> tuple[Array, Array | None]:
+    """Derivatives (k, b) of lengths, as of errors."""
+    first, last = places.starts, places.ends
+    direction = (last - first) / np.linalg.norm(last - first, axis=1)[:, None]
 
     def along(start: Array, end: Array) -> Array:
         return np.einsum("md,mdb->mb", direction, end - start)
 
-    rows = along(corrected(fitted, *first)[1], corrected(fitted, *last)[1])
-    at_first, at_last = drawn_rows(fitted, *first), drawn_rows(fitted, *last)
+    rows = along(corrected(fitted, first, probe)[1], corrected(fitted, last, probe)[1])
+    at_first, at_last = drawn_rows(fitted, first, probe), drawn_rows(fitted, last, probe)
     if at_first is None or at_last is None:
-        return ErrorRows(rows, None)
-    return ErrorRows(rows, along(at_first, at_last))
+        return rows, None
+    return rows, along(at_first, at_last)
 
 
 def _part(probes: Probed, some: slice) -> Probed:
@@ -127,9 +94,9 @@ def drawn_errors(
     errors = np.zeros((draws.count, *points.shape))
     for start in range(0, len(points), POINTS_AT_ONCE):
         some = slice(start, start + POINTS_AT_ONCE)
-        error_rows = rows_of_errors(fitted, points[some], _part(probes, some))
-        errors[:, some] = np.tensordot(deviations, error_rows.rows, axes=(1, 2))
+        rows, _ = _rows_of_errors(fitted, points[some], _part(probes, some))
+        errors[:, some] = np.tensordot(deviations, rows, axes=(1, 2))
     errors += fitted_errors(fitted, points, probes).errors
     lengths = fitted_lengths(fitted, places, probe).errors
-    rows = length_rows(fitted, places, probe).rows
+    rows, _ = _length_rows(fitted, places, probe)
     return Realisations(draws, errors, lengths + deviations @ rows.T)

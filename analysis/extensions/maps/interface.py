@@ -1,4 +1,4 @@
-"""Error maps from Python: corrected points, curves, lengths, differences, adjustments."""
+"""Error maps from Python: corrected points, curves, differences."""
 
 from __future__ import annotations
 
@@ -10,19 +10,15 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from ballplate.arguments import (
     PathLike,
-    experiment_of,
     fit_map_or_path,
     fitted_map_of,
     map_or_path,
     table_of,
 )
-from ballplate.simulator.computing import Report, unreported
-from ballplate.simulator.experiment import Experiment
 from ballplate.simulator.inputs import (
     GivenText,
     ensure_one_of,
     ensure_positive,
-    ensure_report,
     ensure_type,
     ensure_whole,
     hint,
@@ -34,34 +30,11 @@ if TYPE_CHECKING:
     from ballplate.simulator.machines import Array
     from ballplate.simulator.maps import FittedMap
 
-    from .adjusted_machine import AdjustedMachine
-    from .converted_map import ConvertedMap
     from .correction import Correction
     from .error_curves_result import ErrorCurves
-    from .fitted_errors_result import FittedErrorMap
-    from .length_tables import LengthMap
+    from .error_map import ErrorMap
     from .map_difference import MapDifference
     from .map_places import Line
-    from .volumetric_results import MachineErrors
-
-
-def convert(fitted: Fit | FittedMap | PathLike, to: str) -> ConvertedMap:
-    """Return the map of a fit in another error model: a kind such as "empirical", settings such as
-    "{kind: kinematic, position_coefficients: 3}", or the path of an experiment file with the model.
-
-    Its `map` is the new one, with its covariance.
-
-    >>> import ballplate as bp
-    >>> fitted = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart())).to_map()
-    >>> bp.convert(fitted, "{kind: empirical, coefficients: 5}")
-    <ConvertedMap of map: empirical, 195 parameters, the same corrections>
-    """
-    from .converted_map import convert as converted
-    from .map_files_of_machines import map_of_source
-
-    ensure_type(str, 'an error model such as "empirical"', to=to)
-    source_map, label = map_of_source(map_or_path("fitted", fitted))
-    return converted(source_map, to, label)
 
 
 def diff(
@@ -93,7 +66,6 @@ def diff(
     """
     from ballplate.simulator.inputs import Target, parse_length_function, stated_day
 
-    from .comparison import ComparisonSettings
     from .sources import map_difference
 
     ensure_whole(2, 5, grid=grid)
@@ -108,45 +80,13 @@ def diff(
     sides = [fit_map_or_path(name, side) for name, side in (("first", first), ("second", second))]
     return map_difference(
         (sides[0], sides[1]),
-        ComparisonSettings(coverage_factor, grid, probe),
-        shared is not None,
-        None if target is None else target.standard,
-        (days[0], days[1]),
+        coverage_factor=coverage_factor,
+        grid=grid,
+        probe=probe,
+        shared=shared is not None,
+        stated=None if target is None else target.standard,
+        dates=(days[0], days[1]),
     )
-
-
-def lengths(
-    experiment: Experiment | PathLike,
-    target: str | None = None,
-    grid: int | Sequence[int] = 6,
-    probe: str | None = None,
-    coverage_factor: float | None = None,
-    with_repeatability: bool = False,
-    report: Report = unreported,
-) -> LengthMap:
-    """Return uncertainties of all lengths between points of a grid over the volume, against a
-    target.
-
-    `target` replaces that of the experiment, as a text with a unit; `grid` is the number of points
-    along every axis, or along each. `with_repeatability` includes the repeatability of both
-    readings of a length.
-
-    >>> import ballplate as bp
-    >>> bp.lengths(bp.quickstart(), "1 um + L/1000000", grid=3).is_met
-    True
-    """
-    from .length_map import length_map, length_settings
-
-    ensure_type(str, 'a text with a unit, such as "0.5 um + L/1000000"', target=target)
-    ensure_type(str, "the name of a probe", probe=probe)
-    ensure_type(bool, "True or False", with_repeatability=with_repeatability)
-    ensure_positive("a number above 0 and at most 100", 100.0, coverage_factor=coverage_factor)
-    ensure_report(report)
-    counts = _several("grid", grid)
-    ensure_whole(2, **{f"grid[{k}]": count for k, count in enumerate(counts)})
-    chosen = experiment_of(experiment)
-    settings = length_settings(chosen, target, counts, probe, coverage_factor, with_repeatability)
-    return length_map(chosen, settings, report)
 
 
 def map(
@@ -160,28 +100,27 @@ def map(
     draw: int | None = None,
     seed: int = 1,
     budget: bool = False,
-    tasks: Experiment | PathLike | None = None,
-) -> MachineErrors | FittedErrorMap:
-    """Return volumetric errors of a machine file or of a map, with expanded uncertainties: on a
-    grid over the volume, in a plane, along a line, or at points.
+) -> ErrorMap:
+    """Return volumetric errors of a machine file, with standard deviations of its random part, or
+    of a map, with expanded uncertainties: on a grid over the volume, in a plane, along a line, or
+    at points.
 
     `line` is a text as in `ballplate map --line`, co-ordinates in metres of the two fixed axes, or
     two points; `plane` the co-ordinate of the axis across it. `points` is their number along a
     line, a table as for the command, or co-ordinates (m, d) in metres. For a map, `probe` names the
-    probe, and `tasks` of an experiment add lengths. `draw` is the number of realisations of the
-    random part, or of the covariance of a map, from a `seed`. `budget` adds the contributions of
-    parametric errors.
+    probe. `draw` is the number of realisations of the random part, or of the covariance of a
+    map, from a `seed`. `budget` adds the contributions of parametric errors of a machine file.
 
     >>> import ballplate as bp
     >>> bp.map("designs/park/machines/npl-like.yaml", line="y = 300 mm, z = 200 mm", points=3)
-    <ErrorsOnLine of npl-like: 3 points, resultant 16.17 µm at most>
+    <ErrorMap of npl-like: 3 points, resultant 16.17 µm at most>
     >>> fitted = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart())).to_map()
     >>> bp.map(fitted, points=[[0.5, 0.5, 0.5]]).errors.uncertainties.round(8)
     array([[2.2e-07, 1.9e-07, 1.7e-07]])
     """
     import numpy as np
 
-    from .map_files_of_machines import map_errors
+    from .error_map import map_errors
     from .map_places import PlacesAsked, parse_places, parse_plane
     from .realisations import MOST_DRAWS, Draws
     from .volumetric_errors import MOST_POINTS
@@ -220,8 +159,7 @@ def map(
         places,
     )
     draws = None if draw is None else Draws(draw, seed)
-    chosen = () if tasks is None else (experiment_of(tasks),)
-    return map_errors(source, asked, probe, draws, budget, chosen)
+    return map_errors(source, asked, probe, draws, budget)
 
 
 def curves(
@@ -240,7 +178,7 @@ def curves(
     from ballplate.simulator.experiment import is_map_file
 
     from .error_curves_result import error_curves, machine_curves
-    from .map_files_of_machines import map_of_source
+    from .error_sources import map_of_source
 
     ensure_whole(2, 10_000, points=points)
     names = (errors,) if isinstance(errors, str) else tuple(errors)
@@ -250,39 +188,6 @@ def curves(
     if isinstance(source, Path) and not is_map_file(source):
         return machine_curves(source, names, points)
     return error_curves(*map_of_source(source), names, points)
-
-
-def adjust(
-    fitted: Fit | FittedMap | PathLike,
-    scale: str | Iterable[str] = (),
-    turn: str | Iterable[str] = (),
-    after: Fit | FittedMap | PathLike | None = None,
-    share: float = 0.0,
-) -> AdjustedMachine:
-    """Return the errors left by adjustments of a fitted machine, compared with a campaign `after`
-    them; both are fits, maps, or files of maps.
-
-    Changes are texts as those of `ballplate adjust`: `scale` such as "x=22 um/m", and `turn` such
-    as "y-x=12 arcsec" or "y-x=0.25 turns of 1 mm at 400 mm". `share` is the relative standard
-    uncertainty of each.
-
-    :raises ValueError: a text that is no change, or a change that the error model cannot follow.
-
-    >>> import ballplate as bp
-    >>> machine = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart())).to_map()
-    >>> bp.adjust(machine, scale="x=20 um/m")
-    <AdjustedMachine of 5 x 5 ball plate in six positions: 1 change, predicted>
-    """
-    from .adjusted_machine import adjusted_machine
-    from .machine_changes import guideway_turn, scale_change
-
-    first = fitted_map_of("fitted", fitted)
-    second = None if after is None else fitted_map_of("after", after)
-    if not 0.0 <= share <= 1.0:
-        raise ValueError(f"share={share!r}; give a ratio from 0 to 1")
-    changes = [scale_change(text) for text in _texts("scale", scale)]
-    changes += [guideway_turn(text) for text in _texts("turn", turn)]
-    return adjusted_machine(first.title, first, changes, second, share)
 
 
 def correct(
@@ -347,11 +252,3 @@ def _several(name: str, value: Any) -> tuple[int, ...]:
         return tuple(value)
     ensure_whole(2, None, **{name: value})
     return (value,)
-
-
-def _texts(name: str, texts_given: str | Iterable[str]) -> tuple[str, ...]:
-    """One text or several."""
-    texts = (texts_given,) if isinstance(texts_given, str) else tuple(texts_given)
-    for text in texts:
-        ensure_type(str, 'a text such as "x=22 um/m"', **{name: text})
-    return texts

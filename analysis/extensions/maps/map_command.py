@@ -42,12 +42,6 @@ def add_options(parser: ArgumentParser) -> None:
         "--probe", metavar="NAME", help="of a map file: the probe, default that of the map"
     )
     parser.add_argument(
-        "--tasks",
-        metavar="FILE",
-        type=Path,
-        help="of a map file: also the lengths of the measuring tasks of an experiment file",
-    )
-    parser.add_argument(
         "--draw",
         metavar="N",
         type=_draw,
@@ -57,7 +51,7 @@ def add_options(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--budget",
         action="store_true",
-        help="what each parametric error contributes to errors and uncertainties",
+        help="of a machine file: what each parametric error contributes to errors and random parts",
     )
     add_picture(
         parser,
@@ -144,9 +138,7 @@ def _plane(text: str) -> dict[str, float]:
 
 def run(options: Namespace) -> int:
     """Print, and draw, the errors."""
-    from ballplate.simulator.experiment import load
-
-    from .map_files_of_machines import map_errors
+    from .error_map import map_errors
     from .map_places import PlacesAsked
     from .realisations import Draws
 
@@ -157,9 +149,8 @@ def run(options: Namespace) -> int:
     asked = PlacesAsked(options.grid, options.line, options.plane, number, table)
     seed = 1 if options.seed is None else options.seed
     draws = None if options.draw is None else Draws(options.draw, seed)
-    tasks = () if options.tasks is None else load(options.tasks)
     try:
-        errors = map_errors(options.file, asked, options.probe, draws, options.budget, tasks)
+        errors = map_errors(options.file, asked, options.probe, draws, options.budget)
     except ValueError as error:
         raise UsageError(error) from None
     # Before anything is printed that nobody may read to its end.

@@ -18,10 +18,10 @@ from ballplate.simulator.inputs import listing
 from ballplate.simulator.machines import Array
 from ballplate.simulator.maps import InCommon, readings_in_common, verdict_data, verdict_line
 
-from .campaign_tests import TOO_ALIKE, TOO_RARE
+from .campaign_tests import TOO_ALIKE, TOO_RARE, JointDifference
 from .compared_maps import ComparedMap, positions_in_common
 from .comparison import MapComparison
-from .normalised_errors import FigureGroup, JointTest
+from .normalised_errors import FigureGroup
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -95,7 +95,7 @@ class MapDifference(Result):
         return 1.0 - test.p < TOO_RARE
 
     @property
-    def tests(self) -> tuple[JointTest, ...]:
+    def tests(self) -> tuple[JointDifference, ...]:
         """The joint tests that decide: of the map as a whole, and of each plate."""
         comparison = self.comparison
         every = (comparison.test, *(plate.test for plate in comparison.plates))
@@ -122,7 +122,7 @@ class MapDifference(Result):
             return "no value is determined in both"
         return f"{self._verdict(test)} (p = {_chance(test.p)})"
 
-    def _verdict(self, test: JointTest) -> str:
+    def _verdict(self, test: JointDifference) -> str:
         if test.p < LEVEL:
             return "a change is shown"
         is_hidden = self.in_common != "none"
@@ -141,7 +141,7 @@ class MapDifference(Result):
             *(
                 verdict_line(side.lack_of_fit, side.label)
                 for side in (self.first, self.second)
-                if not side.is_expected
+                if side.lack_of_fit is not None
             ),
             "",
             *self._motion_table(),
@@ -214,10 +214,8 @@ class MapDifference(Result):
     def _shown_groups(self) -> tuple[FigureGroup, ...]:
         """Return the groups of values, with all error functions as one."""
         comparison = self.comparison
-        plates = (plate.figures for plate in comparison.plates)
-        functions = [function.figures for function in comparison.functions]
-        joined = (_joined(functions),) if functions else ()
-        return (*comparison.lengths, comparison.places, *joined, *plates)
+        joined = (_joined(comparison.functions),) if comparison.functions else ()
+        return *comparison.lengths, comparison.places, *joined, *comparison.plates
 
     def _tested_lines(self) -> list[str]:
         lines = [*_group_table(self._shown_groups()), ""]
@@ -260,9 +258,9 @@ class MapDifference(Result):
 
     def _function_table(self) -> list[str]:
         columns = {
-            "error function": lambda function: f"{function.name} {function.axis}",
-            "largest |E_n|": ("figures.largest_size", 3),
-            "at": lambda function: function.figures.largest_name.partition(" at ")[2],
+            "error function": lambda function: f"{function.kind} {function.meaning}",
+            "largest |E_n|": ("largest_size", 3),
+            "at": lambda function: function.largest_name.partition(" at ")[2],
             "chi-squared": "test.statistic",
             "of": "test.dimensions",
             "p": ("test.p", _chance),
@@ -417,11 +415,11 @@ def _map_data(side: ComparedMap) -> Data:
         **picked(side, "label", "title", "date"),
         "expected": side.is_expected,
         "degrees_of_freedom": side.degrees_of_freedom,
-        **({} if side.is_expected else {"lack_of_fit": verdict_data(side.lack_of_fit)}),
+        **({} if side.lack_of_fit is None else {"lack_of_fit": verdict_data(side.lack_of_fit)}),
     }
 
 
-def _test_data(test: JointTest) -> Data:
+def _test_data(test: JointDifference) -> Data:
     return {
         "what": test.what,
         "chi_squared": test.statistic,

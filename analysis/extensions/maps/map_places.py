@@ -46,8 +46,7 @@ class MapPlaces:
     """Points (m, d), with numbers along the axes of a grid, and `starts` and `ends` (k, d) of
     lengths with `names`: the body diagonals, or the line's; metres.
 
-    Points of a table may have `names_of_points`, and `probes` (m,) by index; lengths may have
-    `length_probes` (k, 2).
+    Points of a table may have `names_of_points`, and `probes` (m,) by index.
     """
 
     kind: PlaceKind
@@ -58,7 +57,6 @@ class MapPlaces:
     names: tuple[str, ...]
     names_of_points: tuple[str, ...] = ()
     probes: Integers | None = None
-    length_probes: Integers | None = None
 
 
 def parse_places(text: str) -> Line:

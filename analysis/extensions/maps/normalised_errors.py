@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -29,7 +29,8 @@ class FigureGroup:
     """Differences (m,) of one kind, second map less first, with `names`.
 
     `standard_uncertainties` (m,) are NaN where undetermined; `chances` (m,) are probabilities of
-    |E_n| > 1 without a change. `unit` is m or rad.
+    |E_n| > 1 without a change. `unit` is m or rad. Error functions have a `meaning`, these and
+    plates a joint `test`.
     """
 
     kind: str
@@ -39,6 +40,8 @@ class FigureGroup:
     standard_uncertainties: Array
     chances: Array
     coverage_factor: float = 2.0
+    meaning: str = ""
+    test: JointDifference | None = None
 
     @property
     def count(self) -> int:
@@ -90,13 +93,6 @@ class FigureGroup:
     def largest_name(self) -> str:
         """Name of the difference with the largest |E_n|; empty without a comparison."""
         return "" if self.largest is None else self.names[self.largest]
-
-
-@dataclass(frozen=True)
-class JointTest(JointDifference):
-    """Joint test of a group of differences, with its subject."""
-
-    what: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,7 +160,7 @@ class ValueDifference:
         return FigureGroup(kind, unit, names, self.values, u, chances, coverage_factor)
 
     @single_threaded
-    def joint_test(self, what: str) -> JointTest | None:
+    def joint_test(self, what: str) -> JointDifference | None:
         """Return the joint test in the uncertain space less the undetermined one; None if empty."""
         sides = self.first, self.second
         difference = self.by(
@@ -185,4 +181,4 @@ class ValueDifference:
         test = joint_difference(
             difference.values, difference.roots, self.scatters, np.hstack(alone)
         )
-        return None if test is None else JointTest(**vars(test), what=what)
+        return None if test is None else replace(test, what=what)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 from ballplate.results import Fit
@@ -12,27 +12,18 @@ from ballplate.simulator.machines import Integers
 
 from .campaign_tests import orthonormal
 from .compared_maps import ComparedMap, MappedValues, motions, without_shared
-from .normalised_errors import FigureGroup, JointTest, ValueDifference
+from .normalised_errors import FigureGroup, ValueDifference
 
 # Balls of a plate beyond which it is not compared: their joint covariance takes too much memory.
 MOST_BALLS = 500
 
 
-@dataclass(frozen=True, eq=False)
-class PlateDifference:
-    """A plate in two fits: co-ordinates of its balls after the best-fit motion of its frame, with
-    their joint test.
-    """
-
-    artefact: str
-    figures: FigureGroup
-    test: JointTest | None
-
-
 def plate_differences(
     first: ComparedMap, second: ComparedMap, coverage_factor: float
-) -> tuple[PlateDifference, ...]:
-    """The plates of the same names that both maps' fits have estimated."""
+) -> tuple[FigureGroup, ...]:
+    """Co-ordinates of the balls of each plate of the same name that both maps' fits have estimated,
+    after the best-fit motion of its frame.
+    """
     if first.fit is None or second.fit is None:
         return ()
     differences = []
@@ -61,7 +52,7 @@ def plate_differences(
         names = tuple(f"{ball} {axis}" for ball in common for axis in AXIS_NAMES[:d])
         kind = f"balls of {name}"
         group = remainder.group(kind, "m", names, coverage_factor)
-        differences.append(PlateDifference(name, group, remainder.joint_test(kind)))
+        differences.append(replace(group, test=remainder.joint_test(kind)))
     return tuple(differences)
 
 

@@ -21,14 +21,10 @@ from ballplate.simulator.design import (
 )
 from ballplate.simulator.machines import Array, Integers
 
-from .compared_maps import ComparedMap, without_shared
+from .compared_maps import ComparedMap, NotComparableError, without_shared
 
 # Observations that are values of certificates, each with an error of its own.
 SINGLE = (CalibratedDistances, CalibratedCoordinates)
-
-
-class NothingSharedError(ValueError):
-    """Two campaigns without a known common certificate."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,12 +48,12 @@ def with_shared_certificates(
 
     Common values have the same balls, or lengths, the same value and uncertainty.
 
-    :raises NothingSharedError: a map without its fit, or campaigns that have no certified value in
+    :raises NotComparableError: a map without its fit, or campaigns that have no certified value in
         common.
     """
     if first.fit is None or second.fit is None:
         side = first if first.fit is None else second
-        raise NothingSharedError(
+        raise NotComparableError(
             f"{side.label} does not hold what certificates do to it; compare fits, or experiment"
             " files that name their readings"
         )
@@ -67,7 +63,7 @@ def with_shared_certificates(
     common = [key for key in certified[0] if key in certified[1]]
     count = sum(len(certified[0][key].errors) for key in common)
     if not count:
-        raise NothingSharedError(
+        raise NotComparableError(
             "the campaigns have no certified value in common, of the same balls with the same"
             " value and uncertainty; leave out the shared certificate"
         )

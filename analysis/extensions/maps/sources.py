@@ -11,8 +11,8 @@ from ballplate.simulator.inputs import LengthFunction
 from ballplate.simulator.machines import MachineDescription
 from ballplate.simulator.maps import FittedMap
 
-from .compared_maps import ComparedMap, expected_map, map_of_fit
-from .comparison import ComparisonSettings, NotComparableError, compared
+from .compared_maps import ComparedMap, NotComparableError, expected_map, map_of_fit
+from .comparison import compared
 from .fit_files import fit_of_file, kind_of_file
 from .map_difference import MapDifference
 from .shared_certificates import with_shared_certificates
@@ -22,7 +22,10 @@ Side = Path | Fit | FittedMap
 
 def map_difference(
     sides: tuple[Side, Side],
-    settings: ComparisonSettings,
+    *,
+    coverage_factor: float = 2.0,
+    grid: int = 4,
+    probe: str | None = None,
     shared: bool = False,
     stated: LengthFunction | None = None,
     dates: tuple[str | None, str | None] = (None, None),
@@ -36,7 +39,6 @@ def map_difference(
 
     :raises ExperimentError: a file is wrong.
     :raises NotComparableError: the maps, or what is asked for, do not go together.
-    :raises NothingSharedError: `shared` without two fits that share anything.
     """
     labels = _labels(sides)
     described = [
@@ -66,9 +68,8 @@ def map_difference(
     count = None
     if shared:
         first, second, count = with_shared_certificates(first, second)
-    return MapDifference(
-        first, second, compared(first, second, settings), settings.coverage_factor, count
-    )
+    comparison = compared(first, second, coverage_factor, grid, probe)
+    return MapDifference(first, second, comparison, coverage_factor, count)
 
 
 def _expected(
@@ -125,6 +126,6 @@ def _measured(side: Side, label: str, day: str | None) -> ComparedMap:
         day or side.date,
         data=side.data,
         lack_of_fit=side.lack_of_fit,
-        cautions=(side.known_lack_of_fit.caution,),
+        cautions=(side.lack_of_fit.caution,),
         sigma=side.sigma,
     )

@@ -268,11 +268,6 @@ class AlongAxis:
     def unit(self) -> Literal["rad", "m"]:
         return "rad" if self.error.is_rotation else "m"
 
-    @property
-    def range(self) -> float:
-        """Largest less smallest value at the reference point, 0 of a random error."""
-        return 0.0 if self.values is None else float(np.ptp(self.values))
-
 
 def along_axes(machine: MachineDescription, count: int = ALONG) -> list[AlongAxis]:
     """All parametric errors that the machine has, at a number of positions and the points of

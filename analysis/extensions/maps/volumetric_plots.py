@@ -139,16 +139,9 @@ def _face(axes: Axes, face: Array, colour: str, width: float, is_near: bool) -> 
             axes.plot(*line.T, color=colour, linewidth=width, linestyle="-" if is_near else ":")
 
 
-def draw_line(
-    errors: VolumetricErrors,
-    path: str | Path | None = None,
-    factor: float = 2.0,
-    band: str = "2 standard deviations",
-    quantity: str = "error",
-) -> Figure:
-    """A picture of the errors along a line: components, resultant, and a `factor` times the random
-    part about them, as `band` says, with `quantity` they are; it is written to the path, if there
-    is one.
+def draw_line(errors: VolumetricErrors, factor: float, path: str | Path | None = None) -> Figure:
+    """A picture of the errors along a line: components, resultant, and a coverage `factor` times
+    the uncertainties about them; it is written to the path, if there is one.
 
     :raises OSError: the file cannot be written.
     """
@@ -178,8 +171,15 @@ def draw_line(
             linestyle=DASHES[3],
             label="resultant",
         )
-        _band_in_legend(axes, bool(errors.uncertainties.any()), band)
-        _finish(axes, f"{name}, mm", f"{quantity}, µm")
+        if errors.uncertainties.any():
+            words = f"± U, k = {factor:g}"
+            axes.fill_between([], [], [], color=MUTED, alpha=0.3, linewidth=0, label=words)
+        axes.axhline(0.0, color=MUTED, linewidth=0.6)
+        axes.grid(True)
+        axes.margins(x=0.0)
+        axes.set_xlabel(f"{name}, mm")
+        axes.set_ylabel("error, µm")
+        legend_above(axes, 5)
         worst = int(comparable(np.nan_to_num(errors.resultant)).argmax())
         subtitle = (
             f"largest resultant {number(1e6 * errors.resultant[worst])} µm at"
@@ -209,18 +209,3 @@ def _band(axes: Axes, x: Array, values: Array, half: Array, k: int, label: str) 
         # Where bands overlap their edges tell whose they are.
         for edge in (low, high):
             axes.plot(x, edge, color=SERIES[k], linewidth=0.7, linestyle=DASHES[k])
-
-
-def _band_in_legend(axes: Axes, is_drawn: bool, words: str) -> None:
-    """An entry for the bands of all colours."""
-    if is_drawn:
-        axes.fill_between([], [], [], color=MUTED, alpha=0.3, linewidth=0, label=f"± {words}")
-
-
-def _finish(axes: Axes, x: str, y: str) -> None:
-    axes.axhline(0.0, color=MUTED, linewidth=0.6)
-    axes.grid(True)
-    axes.margins(x=0.0)
-    axes.set_xlabel(x)
-    axes.set_ylabel(y)
-    legend_above(axes, 5)

@@ -5,23 +5,18 @@ from __future__ import annotations
 from typing import Any
 
 from ballplate.extensions.campaign.sheet import sheet_of
-from ballplate.extensions.maps.length_map import length_map, length_settings
+from ballplate.extensions.maps.length_map import length_map
 from ballplate.extensions.pages.design_page import DesignContents, design_page
 from ballplate.extensions.pages.page_facts import assumptions, target_in_words, unjudged
 from ballplate.extensions.reliability.redundancy import reliability_of
 from ballplate.planning import Wanted, checked_design
 from ballplate.results import Prediction
 from ballplate.simulator.computing import Report, unreported
-from ballplate.simulator.estimation import linearise
 from ballplate.simulator.experiment import Experiment, with_pool
 from ballplate.simulator.inputs import optional_service
 
-from .motions import null_motions, weak_motions
-
 # Points along each axis of the map of lengths, in two and in three dimensions.
-GRID = {2: (7,), 3: (5,)}
-# What lengths are compared with where the file states nothing; no page tells it.
-NO_TARGET = "1 um"
+GRID = {2: (7, 7), 3: (5, 5, 5)}
 
 
 def page_of_design(
@@ -31,11 +26,8 @@ def page_of_design(
     progress of the search for suggested changes and of the map of lengths.
     """
     design = prediction.design
-    linearisation = linearise(design)
-    target = target_in_words(experiment)
     data: dict[str, Any] = {"run": prediction.to_dict()}
-    settings = length_settings(experiment, target or NO_TARGET, GRID[design.dimension])
-    data["lengths"] = length_map(experiment, settings, report).to_dict()
+    data["lengths"] = length_map(experiment, GRID[design.dimension], report).to_dict()
     judged = prediction.verdict
     pool = with_pool(experiment) if judged.null or judged.weak else None
     checked = checked_design(experiment, pool, Wanted(repairs=pool is not None), report)
@@ -54,10 +46,8 @@ def page_of_design(
     contents = DesignContents(
         experiment.title,
         data,
-        linearisation,
-        null_motions(linearisation),
-        weak_motions(linearisation, experiment.target_uncertainty),
-        target,
+        design,
+        target_in_words(experiment),
         reason,
         experiment.source.name if experiment.name is None else experiment.label,
         assumptions(experiment, len(design.model.parameters)),

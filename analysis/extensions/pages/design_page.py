@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ballplate.simulator.estimation import Linearisation
+from ballplate.simulator.design import Design
 
-from .design_views import ball_views, motion_view, point_view, volume_view
-from .document import Page, PageSection, facts_list, introduction, shipped, written
-from .elements import Html, element, folded, joined, note, sentence, table
+from .design_views import volume_view
+from .document import Page, PageSection, facts_list, introduction, written
+from .elements import Html, element, joined, note, sentence, table
 from .information_section import information_section
 from .length_sections import lengths_section
-from .motions import Motion
 from .quoted import QuotedData
 from .residual_sections import reliability_section
-from .spatial import figure_of
+from .spatial import still_figure
 from .uncertainty_sections import (
-    expansion,
     lengths_words,
     misses_target,
     scale_section,
@@ -29,28 +27,22 @@ from .uncertainty_sections import (
 
 FOOT = (
     "Lengths are in micrometres and angles in microradians unless stated otherwise; u are standard"
-    " uncertainties, U = k u expanded ones, predicted at zero machine error. Every value is"
-    " that of ballplate run, lengths, reliability, check --suggest, run --errors or sheet with"
-    " --json: its data-path names the command and the path in the output."
+    " uncertainties, U = k u expanded ones, predicted at zero machine error. Every value but those"
+    " of lengths throughout the volume is that of ballplate run, reliability, check --suggest, run"
+    " --errors or sheet with --json: its data-path names the command and the path in the output."
 )
-
-# Directions that are drawn, of each kind; the others are told in words.
-MOST_DRAWN = 12
 
 
 @dataclass(frozen=True, eq=False)
 class DesignContents:
     """Contents of a page of a design: plain data as printed by the commands, by the command's
-    name; the linearised design with its undetermined and weak motions; `target` as text; the
-    `file` and its assumptions. `unreliable` is the reason why there is no reliability among the
-    data.
+    name; the `design`; `target` as text; the `file` and its assumptions. `unreliable` is the
+    reason why there is no reliability among the data.
     """
 
     title: str
     data: Mapping[str, Any]
-    at: Linearisation
-    null: Sequence[Motion]
-    weak: Sequence[Motion]
+    design: Design
     target: str
     unreliable: str
     file: str
@@ -61,15 +53,9 @@ def design_page(contents: DesignContents) -> str:
     """The page as a file that needs no other."""
     quoted = {name: QuotedData(f"/{name}", data) for name, data in contents.data.items()}
     run = quoted["run"]
-    factor = expansion(run.at("quantities"))
-    linearisation = contents.at
-    ellipsoids = (
-        [point_view(linearisation, factor)] if len(linearisation.design.evaluation.points) else []
-    )
-    ellipsoids += list(ball_views(linearisation, factor))
     sections = [
         PageSection("volume", "The experiment", _experiment(contents)),
-        PageSection("rank", "What the readings determine", _rank(run, contents)),
+        PageSection("rank", "What the readings determine", _rank(run)),
         *_informing(quoted),
         PageSection("suggestions", "Suggested changes", _suggestions(quoted)),
         PageSection(
@@ -83,14 +69,13 @@ def design_page(contents: DesignContents) -> str:
             "Lengths throughout the volume",
             lengths_section(quoted["lengths"], contents.target),
         ),
-        PageSection("ellipsoids", "Points and balls", figures_wide(map(figure_of, ellipsoids))),
         PageSection("scale", "Where scale comes from", scale_section(run)),
         PageSection("reliability", "Reliability", _reliability(quoted, contents.unreliable)),
         PageSection("sheet", "Run sheet", _sheet(quoted["sheet"])),
     ]
-    verdict = _verdict(run, contents.target, quoted["lengths"])
+    verdict = _verdict(run, contents.target)
     top = introduction(verdict, _is_good(run), contents.file)
-    return written(Page(contents.title, top, sections, FOOT, shipped("view.js")))
+    return written(Page(contents.title, top, sections, FOOT))
 
 
 def _informing(quoted: Mapping[str, QuotedData]) -> list[PageSection]:
@@ -103,12 +88,8 @@ def _informing(quoted: Mapping[str, QuotedData]) -> list[PageSection]:
 
 def _experiment(contents: DesignContents) -> Html:
     """Section on the volume with its artefacts, and on assumptions."""
-    return figures_wide([figure_of(volume_view(contents.at.design)), facts_list(contents.facts)])
-
-
-def figures_wide(content: Iterable[Html]) -> Html:
-    """Return pictures in a row on wide screens."""
-    return element("div", *content, class_="figures views")
+    picture = still_figure(volume_view(contents.design))
+    return element("div", picture, facts_list(contents.facts), class_="figures views")
 
 
 def _is_good(run: QuotedData) -> bool:
@@ -116,7 +97,7 @@ def _is_good(run: QuotedData) -> bool:
     return is_sure and not misses_target(run.data)
 
 
-def _verdict(run: QuotedData, target: str, lengths: QuotedData) -> Html:
+def _verdict(run: QuotedData, target: str) -> Html:
     data = run.data
     count = len(data["weakly_determined"])
     weak = (
@@ -141,7 +122,7 @@ def _verdict(run: QuotedData, target: str, lengths: QuotedData) -> Html:
     else:
         expected = "" if data["as_expected"] else ", though the file expects a deficiency"
         first = sentence(f"Full rank{expected}: the readings determine all ", counts, f"{weak}.")
-    second = sentence(lengths_words(run, target), *_throughout(run, lengths))
+    second = sentence(lengths_words(run, target))
     qualified = (
         sentence(each.text("text"), ".")
         for each in run.at("qualifications").each()
@@ -150,66 +131,26 @@ def _verdict(run: QuotedData, target: str, lengths: QuotedData) -> Html:
     return joined([first, second, *qualified])
 
 
-def _throughout(run: QuotedData, lengths: QuotedData) -> list[str | Html]:
-    """Section on lengths throughout the volume relative to the target, compared with those between
-    the evaluation points, which may be more favourable.
-    """
-    judged = run.data["quantities"].get("U6", {}).get("within_target") is not None
-    shares = {
-        lengths.data["coverage_factor"]: "share_expanded_within",
-        1.0: "share_within",
-    }
-    share = shares.get(lengths.data["target_coverage_factor"])
-    whole = lengths.at("all")
-    if not judged or share is None or whole.data[share] is None:
-        return []
-    undetermined = run.data["quantities"]["U6"]["undetermined"]
-    are = "determined, and within the target" if undetermined else "within it"
-    return [" Of the lengths throughout the volume, ", whole.share(share), f" are {are}."]
-
-
-def _rank(run: QuotedData, contents: DesignContents) -> Html:
+def _rank(run: QuotedData) -> Html:
     parts = []
-    groups = (
+    for key, title, words in (
         (
             "undetermined",
             "Undetermined",
-            contents.null,
             "These change together without changing any observation.",
         ),
         (
             "weakly_determined",
             "Weakly determined",
-            contents.weak,
-            "The observations are almost insensitive to these; each is drawn one standard"
-            " deviation long.",
+            "The observations are almost insensitive to these.",
         ),
-    )
-    for key, title, motions, words in groups:
-        if not run.data[key]:
-            continue
-        pictures: list[Html] = []
-        items: list[Html] = []
-        for k, (motion, direction) in enumerate(
-            zip(motions, run.at(key).each(), strict=True), start=1
-        ):
-            text = direction.text() if key == "undetermined" else direction.text("text")
-            drawn = None
-            if len(pictures) < MOST_DRAWN:
-                name = f"{key.replace('_', '-')}-{k}"
-                drawn = motion_view(contents.at, motion, name, text, f"{title} {k}")
-            if drawn is None:
-                items.append(element("li", text, value=k))
-            else:
-                pictures.append(figure_of(drawn))
-        parts += [element("h3", title), note(words), figures_wide(pictures)]
-        if items:
-            summary = "Directions without a picture" if pictures else "Directions"
-            list_of_others = folded(summary, element("ol", *items), is_open=len(items) <= 20)
-            parts.append(list_of_others)
-    if run.data["reasons"]:
-        reasons = (element("li", direction.text()) for direction in run.at("reasons").each())
-        parts += [element("h3", "Reasons"), element("ul", *reasons)]
+    ):
+        if run.data[key]:
+            directions = (
+                element("li", direction.text() if key == "undetermined" else direction.text("text"))
+                for direction in run.at(key).each()
+            )
+            parts += [element("h3", title), note(words), element("ol", *directions)]
     if not parts:
         return sentence("No direction is undetermined or weakly determined.")
     return joined(parts)
@@ -228,41 +169,31 @@ def _suggestions(quoted: Mapping[str, QuotedData]) -> Html:
         else ""
     )
     rows = []
-    for key in ("complete", "partial"):
-        for number, suggestion in enumerate(repairs.at(key).each(), start=1):
-            changes = joined(
-                (change.text("text") for change in suggestion.at("changes").each()), "; "
+    for number, suggestion in enumerate(repairs.each(), start=1):
+        changes = joined((change.text("text") for change in suggestion.at("changes").each()), "; ")
+        edits = joined(
+            element(
+                "li",
+                element("code", f"{edit['path']}: {json.dumps(edit['value'], ensure_ascii=False)}"),
             )
-            removed = ", ".join(map(str, suggestion.data["removes"]))
-            many = "s" if len(suggestion.data["removes"]) > 1 else ""
-            name = (
-                f"repair {number}" if key == "complete" else f"of direction{many} {removed} alone"
-            )
-            edits = joined(
-                element(
-                    "li",
-                    element(
-                        "code", f"{edit['path']}: {json.dumps(edit['value'], ensure_ascii=False)}"
-                    ),
-                )
-                for edit in suggestion.data["edits"]
-            )
-            u6, loose = (
-                suggestion.micro(symbol) if suggestion.data[symbol] is not None else "-"
-                for symbol in ("average_U6", "average_U6_with_uncertain_offsets")
-            )
-            rows.append(
-                [
-                    name,
-                    changes,
-                    suggestion.number("rank_deficiency"),
-                    suggestion.number("weakly_determined"),
-                    u6,
-                    loose,
-                    suggestion.number("readings"),
-                    element("ul", edits, class_="edits"),
-                ]
-            )
+            for edit in suggestion.data["edits"]
+        )
+        u6, loose = (
+            suggestion.micro(symbol) if suggestion.data[symbol] is not None else "-"
+            for symbol in ("average_U6", "average_U6_with_uncertain_offsets")
+        )
+        rows.append(
+            [
+                f"repair {number}",
+                changes,
+                suggestion.number("rank_deficiency"),
+                suggestion.number("weakly_determined"),
+                u6,
+                loose,
+                suggestion.number("readings"),
+                element("ul", edits, class_="edits"),
+            ]
+        )
     if not rows:
         return sentence("No changes were found that determine everything.")
     heads = [
@@ -275,17 +206,11 @@ def _suggestions(quoted: Mapping[str, QuotedData]) -> Html:
         "more readings",
         "in the file",
     ]
-    title = "Changes, by U6 with uncertain probe offsets, each verified"
+    title = "Changes: moves, then readings, then certificates, each verified"
     made_table = table("repairs", title, heads, rows, (0, 1, 7))
-    whole, parts = len(repairs.data["complete"]), len(repairs.data["partial"])
     introduction = "Each change determines every direction."
-    if not whole:
+    if any(row["rank_deficiency"] for row in repairs.data):
         introduction = "No change determines every direction."
-    elif parts:
-        introduction = (
-            "Each repair determines every direction; the other changes determine some of the"
-            " undetermined ones."
-        )
     return joined([sentence(introduction, now), made_table])
 
 

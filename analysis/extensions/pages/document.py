@@ -1,9 +1,7 @@
-"""The page around the sections: head, list of sections, style, and permissions of its script."""
+"""The page around the sections: head, list of sections, and style."""
 
 from __future__ import annotations
 
-import base64
-import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -25,13 +23,12 @@ class PageSection:
 
 @dataclass(frozen=True)
 class Page:
-    """A page: its title, the introduction below it, sections, foot, and script, if any."""
+    """A page: its title, the introduction below it, sections, and foot."""
 
     title: str
     introduction: Html
     sections: Sequence[PageSection]
     foot: str
-    script: str = ""
 
 
 @cache
@@ -66,21 +63,16 @@ def written(page: Page) -> str:
         top,
         element("main", body, id="main"),
         element("footer", element("p", page.foot)),
-        # A script that a person wrote would have another sum, and is not run.
-        Html(f"<script>{page.script}</script>" if page.script else ""),
     ]
     return (
-        f'<!DOCTYPE html>\n<html lang="en">\n{head(page.title, page.script)}\n'
+        f'<!DOCTYPE html>\n<html lang="en">\n{_head(page.title)}\n'
         f"{element('body', *parts)}\n</html>\n"
     )
 
 
-def head(title: str, script: str) -> Html:
-    """The head of a page that runs this script, if any, and no other."""
+def _head(title: str) -> Html:
+    """The head of a page that runs no script."""
     policy = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
-    if script:
-        digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
-        policy += f"; script-src 'sha256-{digest}'"
     return element(
         "head",
         element("meta", charset="utf-8"),

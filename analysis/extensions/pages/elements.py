@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from html import escape
 
 from ballplate.simulator.inputs import in_one_line
+
+# A table with more columns is printed on a page of its own, across.
+MOST_COLUMNS = 11
 
 
 class Html(str):
@@ -64,7 +67,7 @@ def note(*parts: str) -> Html:
 def table(
     name: str,
     caption: str,
-    heads: Iterable[str],
+    heads: Sequence[str],
     rows: Iterable[Iterable[str]],
     words: Iterable[int] = (0,),
     is_long: bool = False,
@@ -93,6 +96,7 @@ def table(
         for row in rows
     )
     kind = "scroll high" if is_long else "scroll"
+    kind += " wide" if len(heads) > MOST_COLUMNS else ""
     parts = element("thead", element("tr", head), class_="tall"), element("tbody", body)
     return scrolling(f"table-{name}", caption, *parts, kind=kind, class_="tight")
 
@@ -111,7 +115,6 @@ def _width(content: str) -> str:
     return "long" if shown > 40 else "some" if shown > 16 else ""
 
 
-def folded(summary: str, *content: str, is_open: bool = False, is_lengthy: bool = False) -> Html:
-    """Return content shown on demand and, unless it `is_lengthy`, in print."""
-    kind = "lengthy" if is_lengthy else None
-    return element("details", element("summary", summary), *content, open=is_open, class_=kind)
+def folded(summary: str, *content: str, is_open: bool = False) -> Html:
+    """Return content shown on demand, and in print."""
+    return element("details", element("summary", summary), *content, open=is_open)

@@ -2,42 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from ballplate.extensions.reliability.redundancy import reliability_of
-from ballplate.presentation import box_edges, projection
-from ballplate.results import ParameterEstimate, labels, reading_residuals
+from ballplate.results import Fit, labels, reading_residuals
 from ballplate.simulator.design import measured
-from ballplate.simulator.estimation import Solution
-from ballplate.simulator.experiment import Experiment
-from ballplate.simulator.readings import ObservedReadings
 
-from .fit_page import FitContents, PlateResiduals
+from .fit_page import FitContents, PlateResiduals, fit_page
 from .page_facts import assumptions, target_in_words, unjudged
 
 
-def fit_contents(
-    experiment: Experiment,
-    observed: ObservedReadings,
-    solution: Solution,
-    data: Mapping[str, Any],
-    estimates: Sequence[ParameterEstimate],
-    has_scatter: bool,
-    untested: str,
-) -> FitContents:
-    """Return the contents for a fit of an experiment with its plain `data`; residuals of exact
-    readings are rounding and not drawn. `untested` states why there was no test for gross errors.
+def page_of_fit(fit: Fit) -> str:
+    """Return the page of a fit; residuals of exact readings are rounding and not drawn.
+
+    :raises ValueError: it does not know its experiment.
     """
+    experiment, observed, data = fit.experiment, fit.observed, fit.to_dict()
+    if experiment is None:
+        raise ValueError("the fit holds no experiment, which a page names; fit it again")
     design = observed.design
-    volume = design.machine.volume
-    _, towards = projection(design.dimension)
-    edges, _ = box_edges(volume.lower, volume.upper, towards)
     reason = unjudged(design)
     judged = None
-    if not reason and solution.status == "converged":
+    if not reason and fit.converged:
         is_estimated = data["sigma_is_estimated"]
         judged = reliability_of(
             design, sigma_is_estimated=is_estimated, experiment=experiment
@@ -47,37 +34,30 @@ def fit_contents(
     facts = assumptions(experiment, len(design.model.parameters))
     facts.insert(1, ("Readings", f"{len(observed.x)} from {', '.join(files) or 'a table'}"))
     facts.append(("Sigma", f"{how}: it multiplies all stated uncertainties"))
-    return FitContents(
+    names = labels(fit.estimates)
+    contents = FitContents(
         experiment.title,
         data,
-        {name: estimate.kind for name, estimate in zip(labels(estimates), estimates, strict=True)},
+        {name: estimate.kind for name, estimate in zip(names, fit.estimates, strict=True)},
         judged,
         reason,
-        untested or ("" if data["degrees_of_freedom"] > 0 else "there is no redundancy"),
-        _residuals(observed, solution, data["sigma"], has_scatter),
-        edges,
+        fit.untested or ("" if data["degrees_of_freedom"] > 0 else "there is no redundancy"),
+        _residuals(fit),
         target_in_words(experiment),
         (experiment.source.name, *files),
         facts,
+        fit.lack_of_fit.caveat,
     )
+    return fit_page(contents)
 
 
-def _residuals(
-    observed: ObservedReadings, solution: Solution, sigma: float, has_scatter: bool
-) -> PlateResiduals:
-    design = observed.design
+def _residuals(fit: Fit) -> PlateResiduals:
+    design = fit.observed.design
     names = design.positions.names, design.probes.names
-    if solution.status != "converged":
+    if not fit.converged:
         none = np.zeros((0, design.dimension))
-        return PlateResiduals(none, none, none, np.zeros(0, int), np.zeros(0, int), *names)
-    readings, values, standardised = reading_residuals(design, solution, observed.x)
+        return PlateResiduals(none, np.zeros(0, int), np.zeros(0, int), *names)
+    readings, _, standardised = reading_residuals(design, fit.solution, fit.observed.x)
     is_read = measured(design, readings)
-    shown = np.where(is_read, standardised / sigma if has_scatter else 0.0, np.nan)
-    return PlateResiduals(
-        observed.x[design.plate_readings],
-        np.where(is_read, values, np.nan),
-        shown,
-        readings.position,
-        readings.probe,
-        *names,
-    )
+    shown = np.where(is_read, 0.0 if fit.without_scatter else standardised / fit.sigma, np.nan)
+    return PlateResiduals(shown, readings.position, readings.probe, *names)

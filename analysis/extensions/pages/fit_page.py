@@ -10,19 +10,16 @@ import numpy as np
 from ballplate.simulator.machines import Array, Integers
 
 from .curve_sections import curves_section
-from .document import Page, PageSection, facts_list, introduction, shipped, written
+from .document import Page, PageSection, facts_list, introduction, written
 from .elements import Html, element, joined, note, sentence, table
 from .quoted import QuotedData
 from .residual_sections import (
     answers_section,
-    components_section,
     reliability_section,
     residual_charts,
     residual_tables,
-    residual_view,
     suspects_section,
 )
-from .spatial import figure_of
 from .uncertainty_sections import (
     estimates_table,
     expansion,
@@ -41,13 +38,11 @@ FOOT = (
 
 @dataclass(frozen=True, eq=False)
 class PlateResiduals:
-    """Readings (m,) of plates: where the scales were (m, d), what each differs by from the
-    estimate (m, d), in metres and in standard uncertainties, NaN where a co-ordinate is not read,
-    and indices of positions and probes with their names.
+    """Readings (m,) of plates: what each differs by from the estimate (m, d) in standard
+    uncertainties, NaN where a co-ordinate is not read, and indices of positions and probes with
+    their names.
     """
 
-    places: Array
-    values: Array
     standardised: Array
     position: Integers
     probe: Integers
@@ -59,7 +54,7 @@ class PlateResiduals:
 class FitContents:
     """Contents of a page of a fit: plain data of the fit and of its design's reliability (or the
     reason `unreliable`); the reason for untested residuals, possibly empty; `kinds` of the
-    estimates by name; the edges (k, 2, d) of the volume; `target` as text; source `files` and
+    estimates by name; `target` as text; source `files` and
     assumptions; the `caveat` on the target.
     """
 
@@ -70,11 +65,10 @@ class FitContents:
     unreliable: str
     untested: str
     residuals: PlateResiduals
-    edges: Array
     target: str
     files: Sequence[str]
     facts: Sequence[tuple[str, str]]
-    caveat: str = ""
+    caveat: str
 
 
 def fit_page(contents: FitContents) -> str:
@@ -87,14 +81,14 @@ def fit_page(contents: FitContents) -> str:
         sections = [*_results(fit, contents), *sections]
     is_good = has_result and _is_good(contents.data)
     top = introduction(_verdict(fit, contents), is_good, *contents.files)
-    return written(Page(contents.title, top, sections, FOOT, shipped("view.js")))
+    return written(Page(contents.title, top, sections, FOOT))
 
 
 def _results(fit: QuotedData, contents: FitContents) -> list[PageSection]:
     """The sections of a fit that has converged."""
     residuals = contents.residuals
     of_residuals = Html()
-    if len(residuals.places):
+    if len(residuals.standardised):
         of_residuals = joined(
             [
                 residual_charts(
@@ -103,9 +97,6 @@ def _results(fit: QuotedData, contents: FitContents) -> list[PageSection]:
                     residuals.probe,
                     residuals.positions,
                     residuals.probes,
-                ),
-                figure_of(
-                    residual_view(residuals.places, np.nan_to_num(residuals.values), contents.edges)
                 ),
                 residual_tables(fit),
             ]
@@ -126,7 +117,6 @@ def _results(fit: QuotedData, contents: FitContents) -> list[PageSection]:
         ),
         PageSection("asked", "What the readings say of the assumptions", answers_section(fit)),
         PageSection("residuals", "Residuals", of_residuals),
-        PageSection("components", "Variance components", components_section(fit)),
         PageSection("reliability", "Reliability", reliability),
         PageSection("adjustments", "Adjustments", _adjustments(fit)),
         PageSection("plate", "Plate", _plate(fit, contents.kinds)),
@@ -208,7 +198,6 @@ def _rank(fit: QuotedData) -> Html:
     for key, title in (
         ("planned_but_not_read", "Planned, but not read"),
         ("read_but_not_planned", "Read, but not planned"),
-        ("reasons", "Reasons"),
     ):
         if data[key]:
             words = (element("li", direction.text()) for direction in fit.at(key).each())

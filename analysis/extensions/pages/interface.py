@@ -1,4 +1,4 @@
-"""Views and pages of designs and fits from Python."""
+"""Pages of designs, fits and sweeps from Python."""
 
 from __future__ import annotations
 
@@ -11,62 +11,49 @@ from ballplate.arguments import (
 )
 from ballplate.simulator.computing import Report, unreported
 from ballplate.simulator.experiment import Experiment
-from ballplate.simulator.inputs import ensure_path, ensure_report, ensure_type
+from ballplate.simulator.inputs import ensure_path, ensure_report
+
+from .charts import Chart, Trace, chart_svg, figure, figures, legend
+from .document import Page, PageSection, facts_list, written
+from .elements import Html, element, joined, note, sentence, table
 
 if TYPE_CHECKING:
     from ballplate.results import Fit, Prediction
 
-    from .embedded import View
-
-
-def view(subject: Experiment | PathLike | Prediction | Fit) -> View:
-    """Return a design in space: positions of plates, balls and probes of an experiment; of a
-    prediction or a fit also ellipsoids of uncertainty, residuals, and motions of undetermined
-    directions.
-
-    A notebook shows it, to be turned by mouse, buttons or keyboard, and appends it to experiments,
-    predictions and fits. `save(path)` of the result writes a page, or the picture alone.
-
-    >>> import ballplate as bp
-    >>> bp.view(bp.quickstart())
-    <View of quickstart: positions>
-    >>> bp.view(bp.run(bp.quickstart()))
-    <View of quickstart: positions, points, balls of plate>
-    """
-    from ballplate.results import Fit, Prediction
-
-    from .offered import design_view, fit_view
-
-    if isinstance(subject, Fit):
-        return fit_view(subject)
-    if isinstance(subject, Prediction):
-        return design_view(subject)
-    from ballplate.simulator.experiment import lay_out
-
-    from .embedded import View
-    from .views import position_picture
-
-    chosen = experiment_of(subject)
-    return View(chosen.label, chosen.title, (position_picture(lay_out(chosen)),))
+# Of pages of other extensions, in addition to the functions below.
+__all__ = [
+    "Chart",
+    "Html",
+    "Page",
+    "PageSection",
+    "Trace",
+    "chart_svg",
+    "element",
+    "facts_list",
+    "figure",
+    "figures",
+    "joined",
+    "legend",
+    "note",
+    "page",
+    "sentence",
+    "table",
+    "written",
+]
 
 
 def page(
     subject: Experiment | PathLike | Prediction | Fit | Any,
     path: PathLike | None = None,
-    run_modules: bool = False,
-    compare: PathLike | None = None,
     report: Report = unreported,
 ) -> str:
     """Return the page of a design, a fit or a sweep, as written by `run --report`, `fit --report`
     and `sweep --report`: HTML that needs no other file and no network. With a path it is written
     as well.
 
-    Of an experiment it is the page of its design, with the prediction of `run`. Of a sweep,
-    drawings of designs whose error models are in Python need `run_modules`; `compare` names
-    another store for comparison.
+    Of an experiment it is the page of its design, with the prediction of `run`.
 
-    :raises ValueError: a fit or a prediction without its experiment; sweeps that cannot be
-        compared.
+    :raises ValueError: a fit or a prediction without its experiment.
     :raises ImportError: modules for pages of sweeps are not installed.
     :raises OSError: the file cannot be written.
 
@@ -77,19 +64,16 @@ def page(
     from ballplate.presentation import write_file
     from ballplate.results import Fit, Prediction, predict
 
-    ensure_type(bool, "True or False", run_modules=run_modules)
     ensure_report(report)
     if path is not None:
         ensure_path("path", path)
     of_sweep = getattr(subject, "page_text", None)
-    if (run_modules or compare is not None) and of_sweep is None:
-        raise ValueError("run_modules and compare apply to sweeps only; leave them out")
     if isinstance(subject, Fit):
-        from .offered import fit_page_text
+        from .fit_contents import page_of_fit
 
-        text = fit_page_text(subject)
+        text = page_of_fit(subject)
     elif of_sweep is not None:
-        text = of_sweep(run_modules, compare, report)
+        text = of_sweep()
     else:
         from .design_contents import page_of_design
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ballplate.extensions.maps.length_groups import target_words
+from ballplate.extensions.maps.length_map import target_words
 from ballplate.extensions.reliability.remainders import too_many_entries
 from ballplate.presentation import uncertainty_words
 from ballplate.simulator.design import Design

@@ -1,4 +1,4 @@
-"""Sections on residuals of a fit: flagged readings, variance components, reliability."""
+"""Sections on residuals of a fit: flagged readings, reliability."""
 
 from __future__ import annotations
 
@@ -6,18 +6,15 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from ballplate.presentation import SHOWN, round_number
+from ballplate.presentation import SHOWN
 from ballplate.simulator.inputs import listing
 from ballplate.simulator.machines import Array, Integers
 
 from .charts import Chart, Trace, chart_svg, figure, figures, legend
 from .elements import Html, element, joined, note, sentence, table
 from .quoted import QuotedData
-from .spatial import Layer, SpatialPicture
 
 AXES = "xyz"
-# Of the volume's size, the longest residual takes this part at most.
-LONGEST = 0.12
 # Readings whose residuals have room for large dots.
 FEW = 400
 # Biases that a table names.
@@ -82,24 +79,6 @@ def residual_charts(
     )
 
 
-def residual_view(places: Array, residuals: Array, edges: Array) -> SpatialPicture:
-    """Return residuals (m, d) at `places` (m, d) as enlarged vectors, with the edges (k, 2, d) of
-    the volume.
-    """
-    size = float(np.ptp(edges, axis=(0, 1)).max())
-    longest = float(np.linalg.norm(residuals, axis=1).max(initial=0.0))
-    times = round_number(LONGEST * size / longest) if longest > 0.0 else 1.0
-    ends = np.stack([places, places + times * residuals], axis=1).reshape(-1, places.shape[1])
-    layers = [
-        Layer("lines", "faint thin", edges.reshape(-1, edges.shape[2]), (2,) * len(edges)),
-        Layer("lines", "ink", ends, (2,) * len(places)),
-        Layer("dots", "faint", places),
-    ]
-    caption = f"Residuals as vectors from where the balls were read, enlarged {times:,.0f} times."
-    words = "Residuals as vectors in the volume"
-    return SpatialPicture(layers, "residual-vectors", "residuals", words, caption)
-
-
 def residual_tables(fit: QuotedData) -> Html:
     """Root mean squares by position, probe and direction, and the largest residuals."""
     parts = []
@@ -160,38 +139,6 @@ def answers_section(fit: QuotedData) -> Html:
     heads = ["assumption tested", "p-value", "smallest effect that would show", "cannot be tested"]
     words = "Noticed in four of five campaigns; chance: of a larger effect if the assumption holds."
     return joined([first, table("answers", "Assumptions", heads, rows, (0, 3)), note(words)])
-
-
-def components_section(fit: QuotedData) -> Html:
-    """Section on variance components, if requested."""
-    if fit.data.get("variance_components") is None:
-        return Html()
-    components = fit.at("variance_components")
-    rows = [
-        [
-            group.text("group"),
-            group.number("observations"),
-            group.number("redundancy"),
-            *(
-                group.number(name, digits=3)
-                for name in ("ratio", "standard_uncertainty", "lower", "upper")
-            ),
-            group.text("verdict"),
-        ]
-        for group in components.at("groups").each()
-    ]
-    heads = [
-        "group",
-        "observations",
-        "redundancy",
-        "ratio to stated",
-        "u of ratio",
-        "95 % from",
-        "to",
-        "",
-    ]
-    caption = f"Variances by {components.data['by']}, as ratios to the stated ones"
-    return table("components", caption, heads, rows, (0, 7))
 
 
 def reliability_section(reliability: QuotedData) -> Html:

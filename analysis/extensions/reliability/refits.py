@@ -15,7 +15,7 @@ import numpy as np
 from ballplate.extensions.laboratory.wrong_offsets import (
     WrongOffsets,
     discrete_mistakes,
-    offset_differences,
+    offset_shifts,
     stated_offsets,
     with_offsets,
 )
@@ -285,7 +285,7 @@ def _free_offsets(design: Design, x: Array) -> _Offsets | None:
     from scipy.special import chdtri
 
     stated, read = stated_offsets(design), np.unique(design.readings.probe)
-    shifts = offset_differences(design, x).shifts(len(stated))
+    shifts = offset_shifts(design, x)
     exact_design = _exact(design, stated + shifts, read)
     free = np.isin(np.arange(len(stated)), read)[:, None] & np.ones(stated.shape, bool)
     solution = estimate(replace(exact_design, probes=replace(exact_design.probes, free=free)), x)

@@ -1,143 +1,107 @@
-"""Distances and radii that may be calibrated."""
+"""Distances, balls and radii that may be calibrated."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import partial
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.design import DistanceCalibration, Indices, RadiusCalibration
+from ballplate.simulator.design import (
+    CoordinateCalibration,
+    DistanceCalibration,
+    Indices,
+    RadiusCalibration,
+)
 from ballplate.simulator.experiment import Experiment
 from ballplate.simulator.geometry import BallLayout, BryanGaugeSettings, TwoSpheresSettings, pairs
 from ballplate.simulator.inputs import LengthFunction, format_length
 
-from .changes import Change, ChangeKind, distances, with_calibration
-from .written import length_function
+from .changes import Change, ChangeKind
+from .written import length_function, written_length
 
-# Distances between two balls of a line.
-MOST_DISTANCES = 200
+# Distances between two balls that are offered, without sides and diagonals.
+MOST_DISTANCES = 10
 
 
 def certificates(experiment: Experiment) -> Iterator[Change]:
-    """Distances of plates and lengths of bars and gauges that are not calibrated yet."""
+    """Distances and balls of plates, and lengths of bars and gauges, not calibrated yet."""
+    u = LengthFunction(float(experiment.machine.repeatability.min()))
     for name, settings in experiment.artefacts.items():
         layout = experiment.layouts[name]
+        items = [item for item in experiment.calibration if item.artefact == name]
         if isinstance(settings, BryanGaugeSettings):
-            if not any(item.artefact == name for item in experiment.calibration):
-                u = float(experiment.machine.repeatability.min())
-                radius = RadiusCalibration(name, settings.radius, u)
-                add = partial(with_calibration, item=radius)
-                words = f"calibrate the radius of {name} to {format_length(u)}"
-                yield Change(
-                    ChangeKind.CERTIFICATE, words, 1.0, frozenset({f"length of {name}"}), add
-                )
-            continue
-        if settings.role != "plate" and not isinstance(settings, TwoSpheresSettings):
-            continue
-        calibrations = [item for item in experiment.calibration if item.artefact == name]
-        if settings.role != "plate" and calibrations:
-            continue
-        like = like_distances(experiment, name)
-        calibrated = {
-            frozenset(pair)
-            for item in calibrations
-            if isinstance(item, DistanceCalibration)
-            for pair in item.pairs.tolist()
-        }
-        for words, chosen in natural_distances(layout):
-            if any(frozenset(pair) not in calibrated for pair in chosen.tolist()):
-                new = distances(like, layout, chosen)
-                yield calibrated_distances(name, words, new)
+            if not items:
+                radius = RadiusCalibration(name, settings.radius, u.constant)
+                words = f"calibrate the radius of {name} to {format_length(u.constant)}"
+                yield Change(ChangeKind.CERTIFICATE, words, f"length of {name}", radius, values=1)
+        elif settings.role == "plate":
+            yield from _of_plate(experiment, name, layout, u)
+        elif isinstance(settings, TwoSpheresSettings) and not items:
+            pair = np.array([[0, 1]], np.intp)
+            yield _distances(experiment, name, f"distance of the balls of {name}", pair, u)
 
 
-def calibrated_distances(artefact: str, words: str, item: DistanceCalibration) -> Change:
-    """The change of calibrating distances."""
-    assert item.standard_uncertainty is not None
-    u = length_function(item.standard_uncertainty).replace(" um", " µm")
-    change_words = f"calibrate the {words.replace('{}', artefact)} to {u}"
-    touched = frozenset(
-        f"distance {artefact} {min(pair)} {max(pair)}" for pair in item.pairs.tolist()
-    )
-    return Change(
-        ChangeKind.CERTIFICATE,
-        change_words,
-        float(len(item.pairs)),
-        touched,
-        partial(with_calibration, item=item),
-        item,
-    )
+def _of_plate(
+    experiment: Experiment, name: str, layout: BallLayout, u: LengthFunction
+) -> Iterator[Change]:
+    calibrations = [item for item in experiment.calibration if item.artefact == name]
+    distances = [item for item in calibrations if isinstance(item, DistanceCalibration)]
+    stated = [item.standard_uncertainty for item in distances]
+    # As good as the certificate that there is.
+    like = next((each for each in stated if each not in (None, LengthFunction(0.0))), u) or u
+    calibrated = {frozenset(pair) for item in distances for pair in item.pairs.tolist()}
+    for words, chosen in _natural_distances(layout, name):
+        if any(frozenset(pair) not in calibrated for pair in chosen.tolist()):
+            yield _distances(experiment, name, words, chosen, like)
+    if any(isinstance(item, CoordinateCalibration) for item in calibrations):
+        return
+    axes = tuple(range(experiment.dimension))
+    for words, balls in (("corner balls", layout.corner_set), ("balls", range(len(layout.names)))):
+        if balls:
+            indices = np.array(balls, np.intp)
+            values = layout.coordinates[indices][:, list(axes)]
+            uncertainties = np.full(len(axes), like.constant or u.constant)
+            item = CoordinateCalibration(name, indices, axes, values, False, uncertainties)
+            text = f"calibrate the co-ordinates of the {len(balls)} {words} of {name}"
+            text += f" to {written_length(float(uncertainties[0])).replace(' um', ' µm')}"
+            kind, subject = ChangeKind.CERTIFICATE, f"co-ordinates of {name}"
+            yield Change(kind, text, subject, item, values=values.size)
 
 
-def like_distances(experiment: Experiment, artefact: str) -> DistanceCalibration:
-    """Return distances of an artefact without any, with the uncertainty of its other calibrations,
-    or else of readings.
-    """
-    calibrations = [
-        c
-        for c in experiment.calibration
-        if isinstance(c, DistanceCalibration)
-        and c.artefact == artefact
-        and c.standard_uncertainty not in (None, LengthFunction(0.0))
-    ]
-    uncertainty = (
-        calibrations[0].standard_uncertainty
-        if calibrations
-        else LengthFunction(float(experiment.machine.repeatability.min()))
-    )
-    none, no_pairs = np.zeros(0), np.zeros((0, 2), np.intp)
+def _distances(
+    experiment: Experiment, artefact: str, words: str, chosen: Indices, u: LengthFunction
+) -> Change:
+    """Return the change of calibrating distances between pairs (m, 2) of balls."""
     dimensions: Any = 2 if experiment.dimension == 2 else 3
-    return DistanceCalibration(
-        artefact, no_pairs, dimensions, none, False, uncertainty, none, "distance", "included"
+    ends = experiment.layouts[artefact].coordinates[chosen][:, :, :dimensions]
+    values = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    item = DistanceCalibration(
+        artefact, chosen, dimensions, values, False, u, u.at(values), "distance", "included"
     )
+    text = f"calibrate the {words} to {length_function(u).replace(' um', ' µm')}"
+    subject = f"distances {artefact} {chosen.tolist()}"
+    return Change(ChangeKind.CERTIFICATE, text, subject, item, values=len(chosen))
 
 
-def natural_distances(layout: BallLayout) -> Iterator[tuple[str, Indices]]:
-    """Return names and pairs (m, 2) of single distances along the edges, diagonals and rows, and
-    of sets of these pairs.
+def _natural_distances(layout: BallLayout, name: str) -> Iterator[tuple[str, Indices]]:
+    """Return words and pairs (m, 2): single sides, diagonals and distances between outer balls,
+    and sets of pairs.
     """
-    n = len(layout.names)
-    if n < 2:
-        return
-    if n == 2:
-        yield "distance of its balls on {}", np.array([[0, 1]], np.intp)
-        return
-    singles = [
-        pair
-        for name in ("corner sides", "corner diagonals")
-        for pair in layout.pair_sets.get(name, ())
-    ]
-    if not layout.pair_sets:
-        far = np.linalg.norm(layout.coordinates[:, None] - layout.coordinates[None], axis=2)
-        order = np.argsort(-far[np.triu_indices(n, 1)], kind="stable")[:10]
-        singles = [(int(i), int(j)) for i, j in np.column_stack(np.triu_indices(n, 1))[order]]
-    singles += row_pairs(layout)
-    for pair in dict.fromkeys(singles):
-        first, second = (layout.names[k] for k in pair)
-        yield f"distance {first}-{second} of {{}}", np.array([pair], np.intp)
-    for name, words in (
-        ("corner sides", "four sides of {}"),
-        ("corner diagonals", "two diagonals of {}"),
-        ("neighbours", "distances between neighbours on {}"),
-        ("braced", "braced net of distances on {}"),
+    sets = ("corner sides", "corner diagonals")
+    singles = [tuple(pair) for each in sets for pair in layout.pair_sets.get(each, ())]
+    first, second = np.triu_indices(len(layout.names), 1)
+    lengths = np.linalg.norm(layout.coordinates[first] - layout.coordinates[second], axis=1)
+    longest = np.argsort(-np.round(lengths, 9), kind="stable")[:MOST_DISTANCES]
+    singles += [(int(first[k]), int(second[k])) for k in longest]
+    by_pair = {frozenset(pair): pair for pair in reversed(singles)}
+    for pair in reversed(by_pair.values()):
+        ends = "-".join(layout.names[ball] for ball in pair)
+        yield f"distance {ends} of {name}", np.array([pair], np.intp)
+    for each, words in (
+        ("corner sides", "four sides"),
+        ("corner diagonals", "two diagonals"),
+        ("neighbours", "distances between neighbours"),
+        ("braced", "braced net of distances"),
     ):
-        if name in layout.pair_sets:
-            yield f"{words} ({len(layout.pair_sets[name])})", pairs(layout, name)
-
-
-def row_pairs(layout: BallLayout) -> list[tuple[int, int]]:
-    """Return pairs of an outer ball and the balls on its line along x or y, at most
-    `MOST_DISTANCES`, evenly spread.
-    """
-    chosen_pairs = []
-    xy = np.round(layout.coordinates[:, :2], 9)
-    for across, along in ((1, 0), (0, 1)):
-        for line in np.unique(xy[:, across]):
-            members = np.flatnonzero(xy[:, across] == line)
-            members = members[np.argsort(xy[members, along], kind="stable")]
-            chosen_pairs += [(int(members[0]), int(member)) for member in members[:0:-1]]
-    if len(chosen_pairs) <= MOST_DISTANCES:
-        return chosen_pairs
-    return [
-        chosen_pairs[k] for k in np.linspace(0, len(chosen_pairs) - 1, MOST_DISTANCES).astype(int)
-    ]
+        if each in layout.pair_sets:
+            yield f"{words} of {name} ({len(layout.pair_sets[each])})", pairs(layout, each)

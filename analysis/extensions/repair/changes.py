@@ -1,93 +1,104 @@
-"""A change of an experiment: its description, its price, and a function from experiment to
-experiment.
-"""
+"""A change of an experiment: one position, or one calibration item, as it would then be."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import IntEnum
 
 import numpy as np
-from ballplate.simulator.design import (
-    Calibration,
-    DistanceCalibration,
-    Indices,
-    Volume,
-)
-from ballplate.simulator.experiment import Experiment, Position, Probe, ReadingGroup
-from ballplate.simulator.geometry import BallLayout, Pose, ball_coordinates, pairs
+from ballplate.simulator.design import Calibration
+from ballplate.simulator.experiment import Experiment, Position, Probe
+from ballplate.simulator.geometry import BallLayout, ball_coordinates, corners
 from ballplate.simulator.machines import Array
 
 
 class ChangeKind(IntEnum):
-    """Classes of changes, the cheapest first."""
+    """Classes of changes in the order of their proposal: other poses, further readings, and
+    certificates or probes that have to be obtained.
+    """
 
-    POOL = 0
-    MOVE = 1
-    READ_MORE = 2
-    CERTIFICATE = 3
-    ADD_POSITION = 4
-
-
-# What a calibrated distance, and setting up a position, take as many readings for.
-EFFORT = {
-    ChangeKind.CERTIFICATE: 25.0,
-    ChangeKind.READ_MORE: 1.0,
-    ChangeKind.ADD_POSITION: 1.5,
-    ChangeKind.POOL: 1.0,
-}
-
-KINDS = {
-    ChangeKind.POOL: "candidates of the pool",
-    ChangeKind.MOVE: "positions moved",
-    ChangeKind.READ_MORE: "more readings in a position",
-    ChangeKind.CERTIFICATE: "calibration",
-    ChangeKind.ADD_POSITION: "more positions",
-}
+    MOVE = 0
+    READ = 1
+    CERTIFICATE = 2
 
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """Possible change of an experiment.
+    """Possible change of an experiment, with an imperative sentence as `words`.
 
-    `words` is an imperative sentence. `cost` compares changes of one class: seconds for candidates
-    of a pool, otherwise additional readings or distances. Two changes of the same subject exclude
-    each other. `adds` is the additional observation of a change that only adds: a calibration
-    item, a position, or the further readings in the position that `of` names. `candidate` is the
-    index of the pool's candidate, or -1.
+    `item` replaces the position of its name, or is added. Two changes of one `subject` exclude
+    each other. `seconds` are the additional laboratory time, and `values` the number of calibrated
+    values. `probe` is a new one that the item is read with, and `candidate` the index in the pool,
+    or -1.
     """
 
     kind: ChangeKind
     words: str
-    cost: float
-    touches: frozenset[str]
-    apply: Callable[[Experiment], Experiment]
-    adds: Position | Calibration | None = None
-    of: str | None = None
+    subject: str
+    item: Position | Calibration
+    seconds: float = 0.0
+    values: int = 0
+    probe: Probe | None = None
     candidate: int = -1
 
 
-def apply_all(changes: Sequence[Change], experiment: Experiment) -> Experiment:
-    """The experiment with all changes made."""
+def changed(experiment: Experiment, changes: Sequence[Change]) -> Experiment:
+    """Return the experiment with all changes; added positions get names that are not in use."""
+    names = {place.name for place in experiment.positions}
+    after = experiment
     for change in changes:
-        experiment = change.apply(experiment)
-    return experiment
+        if change.probe is not None:
+            after = replace(after, probes={**after.probes, change.probe.name: change.probe})
+        if not isinstance(change.item, Position):
+            after = replace(after, calibration=(*after.calibration, change.item))
+        elif change.item.name in names:
+            after = with_position(after, change.item)
+        else:
+            after = with_added(after, change.item)
+    return after
 
 
-def go_together(changes: Sequence[Change]) -> bool:
-    """True if no two changes concern the same subject."""
-    touched = [name for change in changes for name in change.touches]
-    return len(touched) == len(set(touched))
+def with_position(experiment: Experiment, position: Position) -> Experiment:
+    """Return the experiment with the position of that name replaced, or with it as the last one."""
+    places = {place.name: place for place in experiment.positions} | {position.name: position}
+    return replace(experiment, positions=tuple(places.values()))
 
 
-def is_inside(
-    position: Position, layout: BallLayout, volume: Volume, probes: Mapping[str, Probe]
+def with_added(experiment: Experiment, position: Position) -> Experiment:
+    """Return the experiment with an additional position, under another name if this one is
+    in use.
+    """
+    return with_position(experiment, replace(position, name=free_name(experiment, position.name)))
+
+
+def free_name(experiment: Experiment, name: str) -> str:
+    """Return a name, or the first with a number after it, that no position has."""
+    names = {place.name for place in experiment.positions} | {*experiment.switched_off}
+    return next(
+        candidate_name
+        for k in range(len(names) + 1)
+        if (candidate_name := name if not k else f"{name} {k + 1}") not in names
+    )
+
+
+def is_possible(
+    experiment: Experiment, position: Position, probes: Mapping[str, Probe] | None = None
 ) -> bool:
-    """True if all scale readings of a position are in the volume, as in a file."""
-    lower, upper = volume.of_readings
-    readings = scale_readings(position, layout, probes)
-    return bool(((readings >= lower) & (readings <= upper)).all())
+    """True if all scale readings of a position are in the volume, as in a file, and its artefact
+    is in no box that the pool forbids.
+    """
+    layout, pool = experiment.layouts[position.artefact], experiment.pool
+    lower, upper = experiment.machine.volume.of_readings
+    readings = scale_readings(position, layout, probes or experiment.probes)
+    if not ((readings >= lower) & (readings <= upper)).all():
+        return False
+    if pool is None or not len(pool.forbidden):
+        return True
+    around = corners(position.pose, layout, pool.edge or 0.0)
+    low, high = around.min(axis=0), around.max(axis=0)
+    enters = (low < pool.forbidden[:, 1]) & (high > pool.forbidden[:, 0])
+    return not enters.all(axis=1).any()
 
 
 def scale_readings(position: Position, layout: BallLayout, probes: Mapping[str, Probe]) -> Array:
@@ -102,110 +113,6 @@ def scale_readings(position: Position, layout: BallLayout, probes: Mapping[str, 
     )
 
 
-def with_position(experiment: Experiment, position: Position) -> Experiment:
-    """The experiment with the position of that name replaced, or with it as the last one."""
-    places = tuple(
-        position if place.name == position.name else place for place in experiment.positions
-    )
-    if all(place.name != position.name for place in experiment.positions):
-        places = (*experiment.positions, position)
-    return replace(experiment, positions=places)
-
-
-def with_calibration(experiment: Experiment, item: Calibration) -> Experiment:
-    """The experiment with one calibration item more."""
-    return replace(experiment, calibration=(*experiment.calibration, item))
-
-
-def moved(position: Position, rotation: Array, origin: Array) -> Position:
-    """The position in another pose."""
-    return replace(position, pose=Pose(rotation, origin))
-
-
-def further(position: Position, probe: str) -> Position:
-    """Return all readings of a position, taken once with another probe."""
-    every = {
-        int(i): name
-        for group in position.readings
-        for i, name in zip(group.ball_indices, group.balls, strict=True)
-    }
-    indices = np.array(sorted(every), np.intp)
-    repeats = min(group.repeats for group in position.readings)
-    group = ReadingGroup((probe,), tuple(every[int(i)] for i in indices), indices, repeats)
-    if len(position.readings) == 1:
-        group = replace(position.readings[0], probes=(probe,))
-    return replace(position, readings=(group,))
-
-
-def with_further(
-    experiment: Experiment, name: str, more: Position, probes: Mapping[str, Probe]
-) -> Experiment:
-    """Return the experiment with the readings of `more` added to position `name`, and with any new
-    probes.
-    """
-    (group,) = more.readings
-    position = _named(experiment, name)
-    same = [
-        k
-        for k, reading in enumerate(position.readings)
-        if np.array_equal(reading.ball_indices, group.ball_indices)
-        and reading.repeats == group.repeats
-    ]
-    groups = [*position.readings]
-    if same and len(groups) == 1:
-        groups[0] = replace(groups[0], probes=(*groups[0].probes, *group.probes))
-    else:
-        groups.append(group)
-    changed = with_position(experiment, replace(position, readings=tuple(groups)))
-    return replace(changed, probes={**experiment.probes, **probes})
-
-
-def with_pose(experiment: Experiment, name: str, pose: Pose) -> Experiment:
-    """The experiment with a position in another pose."""
-    return with_position(experiment, replace(_named(experiment, name), pose=pose))
-
-
-def _named(experiment: Experiment, name: str) -> Position:
-    return next(position for position in experiment.positions if position.name == name)
-
-
-def pair_set(layout: BallLayout, chosen: Indices) -> str | None:
-    """Return the name of the set of pairs that indices (m, 2) form, if it has one."""
-    wanted = {frozenset(pair) for pair in chosen.tolist()}
-    for name in (*layout.pair_sets, "all"):
-        if name == "all" and len(wanted) != len(layout.names) * (len(layout.names) - 1) // 2:
-            continue
-        pairs_found = pairs(layout, name)
-        if (
-            len(pairs_found) == len(wanted)
-            and {frozenset(pair) for pair in pairs_found.tolist()} == wanted
-        ):
-            return name
-    return None
-
-
-def ball_set(layout: BallLayout, chosen: Indices) -> str | None:
-    """Return `all` or `corners` if the indices are those."""
-    wanted = set(chosen.tolist())
-    if len(wanted) == len(layout.names):
-        return "all"
-    return "corners" if layout.corner_set and wanted == set(layout.corner_set) else None
-
-
-def distances(
-    like: DistanceCalibration, layout: BallLayout, chosen: Indices
-) -> DistanceCalibration:
-    """Calibrated distances between pairs (m, 2) of balls, otherwise like others that state one
-    standard uncertainty.
-    """
-    assert like.standard_uncertainty is not None
-    ends = layout.coordinates[chosen][:, :, : like.dimensions]
-    values = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    return replace(
-        like,
-        pairs=chosen,
-        values=values,
-        certified=False,
-        standard_uncertainties=like.standard_uncertainty.at(values),
-        root=None,
-    )
+def middle_of(layout: BallLayout) -> Array:
+    """Return the middle (3,) of an artefact's balls in its own frame."""
+    return 0.5 * (layout.coordinates.min(axis=0) + layout.coordinates.max(axis=0))

@@ -30,7 +30,7 @@ def repair(path: PathLike, variant: str | None = None) -> str:
     from ballplate.results import check
     from ballplate.simulator.experiment import with_pool
 
-    from .mending import mended, to_write
+    from .mending import mended
     from .repair_search import repairs
 
     ensure_path("path", path)
@@ -39,7 +39,7 @@ def repair(path: PathLike, variant: str | None = None) -> str:
         judged = check(experiment).verdict
         if not judged.deficiency:
             continue
-        chosen_repair = to_write(repairs(with_pool(experiment)), judged)
+        chosen_repair = repairs(with_pool(experiment)).to_write(judged)
         if chosen_repair is None:
             words = (
                 "no changes were found that determine everything without a certificate or a probe"

@@ -6,7 +6,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from ballplate.rank import Verdict
 from ballplate.results import check
 from ballplate.simulator.experiment import Experiment, load, place_of
 from ballplate.simulator.inputs import (
@@ -22,35 +21,13 @@ from ballplate.simulator.inputs import (
 )
 from ballplate.simulator.inputs import Mapping as MappingNode
 
-from .changes import ChangeKind, apply_all
-from .repair_search import Repair, Repairs
+from .changes import changed
+from .repairs import Repair
 from .written import Edit, edits, lacks_probes, position_settings
 from .yamltext import TextChange, changed_data, with_changes
 
 PLACEMENT = ("plane", "level", "corner", "centre", "quarter_turns", "pose")
 READINGS = ("probes", "balls", "repeats", "standard_uncertainty", "readings")
-
-
-def to_write(repairs: Repairs | None, judged: Verdict, nothing_weak: bool = False) -> Repair | None:
-    """Return the best repair that may be written without a question, unless the design needs none:
-    none that invents anything, or that would repair the design in name only.
-
-    With `nothing_weak` a weakly determined design needs one too.
-    """
-    if repairs is None or not (judged.deficiency or nothing_weak):
-        return None
-    for repair in repairs.complete:
-        is_enough = judged.deficiency or not repair.weak
-        if is_enough and not repair.is_faint and not invents(repair):
-            return repair
-    return None
-
-
-def invents(repair: Repair) -> bool:
-    """Return whether a repair needs a certificate or a probe that the file does not state."""
-    return any(change.kind is ChangeKind.CERTIFICATE for change in repair.changes) or any(
-        edit.steps[0] == "probes" for edit in repair.edits
-    )
 
 
 def mended(
@@ -68,7 +45,7 @@ def mended(
     (experiment,) = (
         loaded_experiment for loaded_experiment in loaded if loaded_experiment.name == variant
     )
-    changed = apply_all(repair.changes, experiment)
+    after = changed(experiment, repair.changes)
     # Nothing is left undetermined, whatever the file expected until now.
     extra = (
         [TextChange(("expected_rank_deficiency",), 0)]
@@ -76,7 +53,7 @@ def mended(
         else []
     )
     extra += _taken_from_pool(experiment, repair)
-    new = with_experiment(text, source, experiment, changed, repair.edits, extra)
+    new = with_experiment(text, source, experiment, after, repair.edits, extra)
     (checked,) = (
         loaded_experiment
         for loaded_experiment in load(source, False, trust, new)

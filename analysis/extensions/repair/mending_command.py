@@ -16,9 +16,8 @@ from ballplate.planning import (
 )
 from ballplate.simulator.inputs import ExperimentError, Message, read_text, refused
 
-from .mending import invents, mended, to_write
-from .repair_tables import changes_in_words
-from .suggestions import Suggestions
+from .mending import mended
+from .repairs import Repairs
 
 MARK = "\ufeff"
 BAD_FILE = 3
@@ -40,16 +39,15 @@ def with_repairs(
         mark, text = _text(path) if checked.designs else ("", "")
         new = text
         for design in checked.designs:
-            repairs_found = _suggestions(design).repairs
-            repair = to_write(repairs_found, design.prediction.verdict, wanted.nothing_weak)
+            found, judged = _suggestions(design), design.prediction.verdict
+            repair = found.to_write(judged, wanted.nothing_weak)
             name = f"{path}: {design.prediction.label}"
-            best = repairs_found.complete[0] if repairs_found and repairs_found.complete else None
-            is_bad = design.prediction.verdict.deficiency or wanted.nothing_weak
-            if is_bad and best is not None and best is not repair and invents(best):
+            is_bad = judged.deficiency or wanted.nothing_weak
+            if is_bad and found.repairs and found.repairs[0].invents:
                 words = "a certificate or a probe that the file does not state"
-                statuses.append(f"{name}: not written, {words}: {changes_in_words(best)}")
+                statuses.append(f"{name}: not written, {words}: {found.repairs[0].words}")
             if repair is None:
-                if not design.prediction.verdict.deficiency:
+                if not judged.deficiency:
                     statuses.append(f"{name}: nothing to repair")
                 continue
             try:
@@ -57,7 +55,7 @@ def with_repairs(
             except ExperimentError as error:
                 messages += error.messages
                 continue
-            statuses.append(f"{name}: repaired: {changes_in_words(repair)}")
+            statuses.append(f"{name}: repaired: {repair.words}")
         if new != text:
             status = _write(path, mark, text, new, options)
     except ExperimentError as error:
@@ -75,13 +73,12 @@ def _as_asked(design: CheckedDesign, with_suggestions: bool) -> CheckedDesign:
     """Remove suggestions of sufficient designs, unless requested."""
     if with_suggestions or design.prediction.verdict.deficiency:
         return design
-    return advised(replace(design, suggestions=Suggestions()))
+    return advised(replace(design, suggestions=Repairs()))
 
 
-def _suggestions(design: CheckedDesign) -> Suggestions:
+def _suggestions(design: CheckedDesign) -> Repairs:
     """Return the suggestions of a design; empty without a search."""
-    suggestions = design.suggestions
-    return suggestions if isinstance(suggestions, Suggestions) else Suggestions()
+    return design.suggestions if isinstance(design.suggestions, Repairs) else Repairs()
 
 
 def _text(path: Path) -> tuple[str, str]:
@@ -100,13 +97,10 @@ def _write(path: Path, mark: str, text: str, new: str, options: Namespace) -> in
 
     :raises ExperimentError: the text has changed, or the file cannot be written.
     """
-    with options.interruption.held():
-        check_overwritten(path)
+    check_overwritten(path)
     if _text(path) != (mark, text):
         changed = "the file has changed meanwhile and is not overwritten; start again"
         raise refused(path, changed)
     content = (mark + new).encode()
-    is_written = write_outputs(
-        {path: lambda place: place.write_bytes(content)}, True, options.interruption.held
-    )
+    is_written = write_outputs({path: lambda place: place.write_bytes(content)}, True)
     return 0 if is_written else BAD_FILE

@@ -13,13 +13,16 @@ from ballplate.simulator.design import (
     Calibration,
     CoordinateCalibration,
     DistanceCalibration,
+    Indices,
     RadiusCalibration,
 )
 from ballplate.simulator.experiment import Experiment, Position, ReadingGroup
 from ballplate.simulator.geometry import (
     AXIS_INDEX,
     IN_PLANE_AXES,
+    BallLayout,
     ball_coordinates,
+    pairs,
     plane_rotation,
 )
 from ballplate.simulator.inputs import (
@@ -33,7 +36,6 @@ from ballplate.simulator.inputs import (
 )
 from ballplate.simulator.machines import Array
 
-from .changes import ball_set, pair_set
 from .yamltext import flow
 
 AXES = "xyz"
@@ -220,6 +222,29 @@ def calibration_settings(experiment: Experiment, item: Calibration) -> dict[str,
     elif isinstance(item, RadiusCalibration):
         settings["standard_uncertainty"] = written_length(item.standard_uncertainty)
     return settings
+
+
+def pair_set(layout: BallLayout, chosen: Indices) -> str | None:
+    """Return the name of the set of pairs that indices (m, 2) form, if it has one."""
+    wanted = {frozenset(pair) for pair in chosen.tolist()}
+    for name in (*layout.pair_sets, "all"):
+        if name == "all" and len(wanted) != len(layout.names) * (len(layout.names) - 1) // 2:
+            continue
+        pairs_found = pairs(layout, name)
+        if (
+            len(pairs_found) == len(wanted)
+            and {frozenset(pair) for pair in pairs_found.tolist()} == wanted
+        ):
+            return name
+    return None
+
+
+def ball_set(layout: BallLayout, chosen: Indices) -> str | None:
+    """Return `all` or `corners` if the indices are those."""
+    wanted = set(chosen.tolist())
+    if len(wanted) == len(layout.names):
+        return "all"
+    return "corners" if layout.corner_set and wanted == set(layout.corner_set) else None
 
 
 def length_function(value: LengthFunction) -> str:

@@ -1,35 +1,26 @@
-"""A document's statements compared with the shipped designs, each with a verdict."""
+"""A document's values and statements compared with the shipped designs, each with a verdict."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, Literal
 
 import numpy as np
-from ballplate.estimators import (
-    EstimatorComparison,
-    compare_estimators,
-)
-from ballplate.simulator.computing import Report, unreported
-from ballplate.uncertainty import Quantity
+from ballplate.estimators import compare_estimators
+from ballplate.simulator.computing import Report
 
 from .published import (
     REPEATABILITY,
     SUM_OF_SQUARES,
-    SYMBOLS,
     Difference,
     Document,
     Erratum,
-    Illegible,
-    OneSided,
     PublishedColumn,
     PublishedIterations,
     RankStatement,
     Remark,
-    Reservation,
-    Statistic,
+    case_of,
     section_of,
 )
 from .shipped import (
@@ -39,434 +30,155 @@ from .shipped import (
     shipped_experiment,
     sums_of_squares,
     tabulated,
-    variants,
 )
 
 
 @dataclass(frozen=True)
-class ComparedFigure:
-    """A published value and ballplate's, in metres or radians.
+class ComparedValue:
+    """A published value or statement and what ballplate computes, in metres and radians.
 
-    `ratio` is `published` over `ours`, `adjusted` the ratio after the column's common factor, which
-    must be `within` limits; `rests_on` are keys of assumptions.
+    Values of a table are compared by their ratio after the common `factor` of their column, which
+    must be `within` limits. Without a factor the computed value itself must be; a statement in
+    words has no published value (NaN). `note` is the key of an exception, or the statement.
     """
 
+    table: str
     quantity: str
+    case: str
     unit: str
     published: float
-    ours: float
-    ratio: float
-    adjusted: float
+    computed: float
     within: tuple[float, float]
-    exception: Reservation | None
-    rests_on: str
+    factor: float | None = None
+    note: str = ""
+
+    @property
+    def ratio(self) -> float:
+        """Published over computed value after the common factor; NaN of statements."""
+        return math.nan if self.factor is None else self.published / self.computed / self.factor
 
     @property
     def agrees(self) -> bool:
-        return self.within[0] <= self.adjusted <= self.within[1]
+        compared = self.computed if self.factor is None else self.ratio
+        return self.within[0] <= compared <= self.within[1]
 
 
-@dataclass(frozen=True)
-class ComparedColumn:
-    """A column of a table with its common factor, which must be `within` limits."""
-
-    column: PublishedColumn
-    factor: float
-    within: tuple[float, float]
-    figures: tuple[ComparedFigure, ...]
-
-    @property
-    def factor_agrees(self) -> bool:
-        return self.within[0] <= self.factor <= self.within[1]
-
-    @property
-    def agrees(self) -> bool:
-        return self.factor_agrees and all(figure.agrees for figure in self.figures)
-
-
-@dataclass(frozen=True)
-class ComparedRank:
-    """A statement on rank, with the deficiency of one of its designs and the gap that decides
-    it.
-    """
-
-    design: str
-    published: int | Literal["some"]
-    ours: int
-    gap: float
-
-    @property
-    def agrees(self) -> bool:
-        return self.ours > 0 if self.published == "some" else self.ours == self.published
-
-
-@dataclass(frozen=True)
-class ComparedRemark:
-    """A remark on averages, with the least and the largest of its ratios."""
-
-    remark: Remark
-    least: float
-    largest: float
-
-    @property
-    def agrees(self) -> bool:
-        low, high = self.remark.at_least, self.remark.at_most
-        return (low is None or self.least >= low) and (high is None or self.largest <= high)
-
-
-@dataclass(frozen=True)
-class ErratumLine:
-    """Ratios of the published values of a column to those of the design in the heading, and the
-    meant one.
-
-    The deviations are the largest from the common factor.
-    """
-
-    statistic: Statistic
-    headed: str
-    meant: str
-    ratios_as_headed: dict[str, float]
-    ratios_as_meant: dict[str, float]
-    deviation_as_headed: float
-    deviation_as_meant: float
-
-
-@dataclass(frozen=True)
-class ComparedErratum:
-    """A block under an incorrect heading; `limit` is the largest deviation of a column that
-    agrees.
-    """
-
-    erratum: Erratum
-    lines: tuple[ErratumLine, ...]
-    limit: float
-
-    @property
-    def agrees(self) -> bool:
-        """Return whether the values are those of the designs meant, and not those in the
-        heading.
-        """
-        meant = all(line.deviation_as_meant <= self.limit for line in self.lines)
-        return meant and any(line.deviation_as_headed > self.limit for line in self.lines)
-
-
-Rule = Literal["within", "most", "shown"]
-
-
-@dataclass(frozen=True)
-class ProgressLine:
-    """One value of an iteration: a step, or a sum of squares in square metres; `limit` is a factor.
-
-    A published value agrees `within` that factor, is an upper limit for `most`, or is `shown` only;
-    NaN if illegible.
-    """
-
-    quantity: str
-    published: float
-    ours: float
-    rule: Rule
-    limit: float
-
-    @property
-    def agrees(self) -> bool:
-        if self.rule == "shown":
-            return True
-        at_most = self.ours <= self.limit * self.published
-        return at_most and (self.rule == "most" or self.ours >= self.published / self.limit)
-
-
-@dataclass(frozen=True)
-class ComparedProgress:
-    """Iterations of one fit; whether it settled within the published number."""
-
-    progress: PublishedIterations
-    settled: bool
-    iterations: int
-    lines: tuple[ProgressLine, ...]
-
-    @property
-    def agrees(self) -> bool:
-        return self.progress.settles in (None, self.settled) and all(
-            line.agrees for line in self.lines
-        )
-
-
-@dataclass(frozen=True)
-class ComparedDifference:
-    """Two estimators over synthetic data sets, and the published differences of one; `limit` is
-    a factor.
-    """
-
-    difference: Difference
-    comparison: EstimatorComparison
-    limit: float
-
-    @property
-    def parts(self) -> tuple[PlacedFigure, ...]:
-        named_values = (("rms", self.comparison.rms), ("maximum", self.comparison.maximum))
-        return tuple(
-            PlacedFigure(
-                name, getattr(self.difference, name), tuple(map(float, values)), self.limit
-            )
-            for name, values in named_values
-        )
-
-    @property
-    def agrees(self) -> bool:
-        return not self.comparison.failed and all(part.agrees for part in self.parts)
-
-
-@dataclass(frozen=True)
-class PlacedFigure:
-    """A published value, in metres, among the values of synthetic data sets."""
-
-    quantity: str
-    published: float
-    values: tuple[float, ...]
-    limit: float
-
-    @property
-    def median(self) -> float:
-        return float(np.median(self.values))
-
-    @property
-    def below(self) -> float:
-        """Share of the values below the published one."""
-        return float((np.array(self.values) < self.published).mean())
-
-    @property
-    def agrees(self) -> bool:
-        inside = min(self.values) < self.published < max(self.values)
-        return inside and 1.0 / self.limit < self.published / self.median < self.limit
-
-
-@dataclass(frozen=True)
-class Section:
-    """All comparisons of one section; `skipped` names those skipped to save time."""
-
-    name: str
-    title: str
-    rests_on: str
-    ranks: tuple[ComparedRank, ...] = ()
-    columns: tuple[ComparedColumn, ...] = ()
-    remarks: tuple[ComparedRemark, ...] = ()
-    errata: tuple[ComparedErratum, ...] = ()
-    progress: tuple[ComparedProgress, ...] = ()
-    differences: tuple[ComparedDifference, ...] = ()
-    illegible: tuple[Illegible, ...] = ()
-    skipped: str = ""
-
-    @property
-    def agrees(self) -> bool:
-        compared: tuple[Any, ...] = (
-            *(*self.ranks, *self.columns, *self.remarks),
-            *(*self.errata, *self.progress, *self.differences),
-        )
-        return all(statement.agrees for statement in compared)
-
-
-@dataclass(frozen=True)
-class Side:
-    """Adjusted ratios of the published values of a one-sided quantity."""
-
-    stated: OneSided
-    ratios: tuple[float, ...]
-
-    @property
-    def above(self) -> int:
-        """Number of published values above ballplate's."""
-        return sum(ratio > 1.0 for ratio in self.ratios)
-
-
-@dataclass(frozen=True)
-class Reproduction:
-    """A document's sections, compared."""
-
-    document: Document
-    sections: tuple[Section, ...]
-
-    @property
-    def sides(self) -> tuple[Side, ...]:
-        """The one-sided quantities of the compared columns."""
-        one_sided_quantities = []
-        for stated in self.document.statements.one_sided:
-            ratios = [
-                figure.adjusted
-                for section in self.sections
-                for compared in section.columns
-                for figure in compared.figures
-                if (figure.quantity, compared.column.statistic)
-                == (stated.quantity, stated.statistic)
-            ]
-            one_sided_quantities += [Side(stated, tuple(ratios))] if ratios else []
-        return tuple(one_sided_quantities)
-
-    @property
-    def agrees(self) -> bool:
-        return all(section.agrees for section in self.sections)
-
-
-def reproduce(
-    document: Document,
-    shipped: Shipped,
-    sections: Iterable[str] = (),
-    trials: int | None = 100,
-    report: Report = unreported,
-) -> Reproduction:
-    """Compute the experiments of a document's sections, by default all.
+def compare_section(
+    document: Document, shipped: Shipped, section: str, trials: int | None, report: Report
+) -> list[ComparedValue]:
+    """Compare everything that a document states in one section.
 
     `trials` is the number of synthetic data sets for the comparison of estimators; None skips it.
     `report` receives progress.
 
     :raises ExperimentError: a shipped design is missing or has errors.
     """
-    wanted = tuple(sections) or document.statements.sections
-    return Reproduction(
-        document,
-        tuple(
-            _section(document, shipped, name, trials, report)
-            for name in document.statements.sections
-            if name in wanted
-        ),
-    )
-
-
-def _section(
-    document: Document, shipped: Shipped, name: str, trials: int | None, report: Report
-) -> Section:
-    statements = document.statements
-    illegible = tuple(block for block in statements.illegible if block.section == name)
-    differences = [
-        difference for difference in statements.differences if section_of(difference.design) == name
+    compared = [
+        compare_rank(shipped, design, statement)
+        for statement in document.ranks
+        for design in statement.designs
+        if statement.section == section
     ]
-    skipped = (
-        "the comparison of estimators over synthetic data sets"
-        if differences and trials is None
-        else ""
+    for column in document.columns:
+        if column.section == section:
+            compared += compare_column(document, shipped, column)
+    for remark in document.remarks:
+        if remark.section == section:
+            compared += compare_remark(shipped, remark)
+    for erratum in document.errata:
+        if section_of(erratum.headed[0]) == section:
+            compared.append(compare_erratum(document, shipped, erratum))
+    for iterations in document.convergence:
+        if section_of(iterations.design) == section:
+            compared += compare_iterations(document, shipped, iterations)
+    for difference in document.differences:
+        if section_of(difference.design) == section and trials is not None:
+            compared += compare_difference(document, shipped, difference, trials, report)
+    return compared
+
+
+def compare_rank(shipped: Shipped, design: str, statement: RankStatement) -> ComparedValue:
+    """Compare a stated rank deficiency with that of one of its designs."""
+    stated, computed = statement.deficiency, planned(shipped, design).verdict.deficiency
+    published, within, note = (
+        (math.nan, (1.0, math.inf), "deficient")
+        if stated == "some"
+        else (float(stated), (stated, stated), "")
     )
-    return Section(
-        name,
-        next(iter(variants(shipped, name).values())).title,
-        rests_on(document, name),
-        tuple(
-            compare_rank(shipped, statement, design)
-            for statement in statements.ranks
-            for design in statement.designs
-            if statement.section == name
-        ),
-        tuple(
-            compare_column(document, shipped, column)
-            for column in document.columns
-            if column.section == name
-        ),
-        tuple(
-            compare_remark(shipped, remark)
-            for remark in statements.remarks
-            if remark.section == name
-        ),
-        tuple(
-            compare_erratum(document, shipped, erratum)
-            for erratum in statements.errata
-            if section_of(erratum.headed[0]) == name
-        ),
-        tuple(
-            compare_progress(document, shipped, progress)
-            for progress in statements.convergence
-            if section_of(progress.design) == name
-        ),
-        tuple(
-            compare_difference(document, shipped, difference, trials, report)
-            for difference in differences
-            if trials is not None
-        ),
-        illegible,
-        skipped,
+    return ComparedValue(
+        "", "rank deficiency", case_of(design), "", published, computed, within, note=note
     )
 
 
-def rests_on(document: Document, section: str, quantity: str | None = None) -> str:
-    """Return the keys of the assumptions of a section, or of one quantity in it, as one string."""
-    chosen = SYMBOLS if quantity is None else (quantity,)
-    return "".join(
-        assumption.key
-        for assumption in document.statements.assumptions
-        if any(assumption.concerns(section, symbol) for symbol in chosen)
-    )
-
-
-def common_factor(ratios: Iterable[float]) -> float:
-    """Return the median of ratios, which a few outliers do not move; NaN without any.
-
-    >>> common_factor([0.9, 1.0, 1.6])
-    1.0
+def compare_column(
+    document: Document, shipped: Shipped, column: PublishedColumn
+) -> list[ComparedValue]:
+    """Compare the common factor of one column, which exceptions do not influence, and then its
+    values after that factor.
     """
-    values = list(ratios)
-    return float(np.median(values)) if values else math.nan
-
-
-def compare_column(document: Document, shipped: Shipped, column: PublishedColumn) -> ComparedColumn:
-    """Compare the values of one column after its common factor, which exceptions do not
-    influence.
-    """
-    statements = document.statements
     quantities = tabulated(shipped, column.design)
-    ratios = _ratios(column, quantities)
     exceptions = {
-        symbol: next(
-            (
-                reservation
-                for reservation in statements.exceptions
-                if reservation.concerns(column, symbol)
-            ),
-            None,
-        )
-        for symbol in ratios
+        symbol: exception
+        for exception in reversed(document.exceptions)
+        for symbol in column.figures
+        if exception.concerns(column, symbol)
     }
-    factor = common_factor(ratio for symbol, ratio in ratios.items() if exceptions[symbol] is None)
-    usual = (1.0 - statements.limits.figure, 1.0 + statements.limits.figure)
-    figures = []
-    for symbol, ratio in ratios.items():
-        exception = exceptions[symbol]
-        figures.append(
-            ComparedFigure(
-                symbol,
+    ratios = _ratios(shipped, column, column.design)
+    factor = _median(ratio for symbol, ratio in ratios.items() if symbol not in exceptions)
+    limit, usual = document.limits.factor, document.limits.figure
+    compared = [
+        ComparedValue(
+            column.table,
+            f"factor, {column.statistic}",
+            column.case,
+            "",
+            math.nan,
+            factor,
+            (1.0 - limit, 1.0 + limit),
+        )
+    ]
+    for symbol, published in column.figures.items():
+        exception = exceptions.get(symbol)
+        compared.append(
+            ComparedValue(
+                column.table,
+                f"{symbol} {column.statistic}",
+                column.case,
                 quantities[symbol].unit,
-                column.figures[symbol],
+                published,
                 getattr(quantities[symbol], column.statistic),
-                ratio,
-                ratio / factor,
-                exception.within if exception else usual,
-                exception,
-                rests_on(document, column.section, symbol),
+                exception.within if exception else (1.0 - usual, 1.0 + usual),
+                factor,
+                f"see {exception.key}" if exception else "",
             )
         )
-    of_factor = (1.0 - statements.limits.factor, 1.0 + statements.limits.factor)
-    return ComparedColumn(column, factor, of_factor, tuple(figures))
+    return compared
 
 
-def _ratios(column: PublishedColumn, quantities: dict[str, Quantity]) -> dict[str, float]:
+def _median(ratios: Iterable[float]) -> float:
+    """Return the median, which a few outliers do not move."""
+    return float(np.median(list(ratios)))
+
+
+def _ratios(shipped: Shipped, column: PublishedColumn, design: str) -> dict[str, float]:
+    """Return the ratios of a column's values to those of a design."""
+    quantities = tabulated(shipped, design)
     return {
         symbol: value / getattr(quantities[symbol], column.statistic)
         for symbol, value in column.figures.items()
     }
 
 
-def compare_rank(shipped: Shipped, statement: RankStatement, design: str) -> ComparedRank:
-    """Compare a stated rank deficiency with that of one design."""
-    verdict = planned(shipped, design).verdict
-    return ComparedRank(design, statement.deficiency, verdict.deficiency, verdict.gap)
-
-
-def compare_remark(shipped: Shipped, remark: Remark) -> ComparedRemark:
-    """Compute the ratios of a remark."""
+def compare_remark(shipped: Shipped, remark: Remark) -> list[ComparedValue]:
+    """Compare the least and the largest ratio of a remark with its limits."""
     ratios = []
     for design, reference in remark.pairs:
         if remark.quantities == (SUM_OF_SQUARES,):
-            last, compared = (
+            last, compared_with = (
                 sums_of_squares(fitted_exactly(shipped_experiment(shipped, name)))[-1]
                 for name in (design, reference)
             )
-            ratios.append(last / compared)
+            ratios.append(last / compared_with)
             continue
         plan = planned(shipped, design)
         for symbol in remark.quantities:
@@ -475,90 +187,125 @@ def compare_remark(shipped: Shipped, remark: Remark) -> ComparedRemark:
             else:
                 compared_with = planned(shipped, reference).quantities[symbol].average
             ratios.append(plan.quantities[symbol].average / compared_with)
-    return ComparedRemark(remark, float(np.min(ratios)), float(np.max(ratios)))
+    note = f"{', '.join(remark.quantities)}: {remark.text}"
+    limits = (
+        ("least ratio", min(ratios), remark.at_least, math.inf),
+        ("largest ratio", max(ratios), 0.0, remark.at_most),
+    )
+    return [
+        ComparedValue("", quantity, "", "", math.nan, ratio, (low, high), note=note)
+        for quantity, ratio, low, high in limits
+        if low is not None and high is not None
+    ]
 
 
-def compare_erratum(document: Document, shipped: Shipped, erratum: Erratum) -> ComparedErratum:
-    """Compare values with the designs in their heading, and with those meant."""
-    statements = document.statements
-    lines = []
+def compare_erratum(document: Document, shipped: Shipped, erratum: Erratum) -> ComparedValue:
+    """Compute the largest deviation of a block's values from the designs in its heading, which must
+    exceed that of a column that agrees; columns have the values of the designs meant.
+    """
+    deviations = []
     for headed, meant in zip(erratum.headed, erratum.meant, strict=True):
         for column in document.columns:
-            table = erratum.figures_of or erratum.table
-            if (column.table, column.design) != (
-                table,
-                meant,
-            ) or column.statistic not in erratum.statistics:
-                continue
-            ratios_of_designs = [
-                _ratios(column, tabulated(shipped, design)) for design in (headed, meant)
-            ]
-            regular = [
-                symbol
-                for symbol in column.figures
-                if not any(
-                    reservation.concerns(column, symbol) for reservation in statements.exceptions
-                )
-            ]
-            deviations = []
-            for ratios in ratios_of_designs:
-                factor = common_factor(ratios[symbol] for symbol in regular)
-                deviations.append(max(abs(ratios[symbol] / factor - 1.0) for symbol in regular))
-            lines.append(
-                ErratumLine(
-                    column.statistic,
-                    headed,
-                    meant,
-                    ratios_of_designs[0],
-                    ratios_of_designs[1],
-                    *deviations,
-                )
-            )
-    return ComparedErratum(erratum, tuple(lines), statements.limits.figure)
+            if (column.table, column.design) == (erratum.figures_of or erratum.table, meant) and (
+                column.statistic in erratum.statistics
+            ):
+                ratios = [
+                    ratio
+                    for symbol, ratio in _ratios(shipped, column, headed).items()
+                    if not any(one.concerns(column, symbol) for one in document.exceptions)
+                ]
+                factor = _median(ratios)
+                deviations += [abs(ratio / factor - 1.0) for ratio in ratios]
+    return ComparedValue(
+        erratum.table,
+        "as headed, off by",
+        "",
+        "",
+        math.nan,
+        max(deviations),
+        (document.limits.figure, math.inf),
+        note=erratum.text,
+    )
 
 
-def compare_progress(
-    document: Document, shipped: Shipped, progress: PublishedIterations
-) -> ComparedProgress:
-    """Compare the iterations of a fit of exact readings."""
-    limits = document.statements.limits
-    fitted = fitted_exactly(shipped_experiment(shipped, progress.design))
+def compare_iterations(
+    document: Document, shipped: Shipped, published: PublishedIterations
+) -> list[ComparedValue]:
+    """Compare the iterations of a fit of exact readings with a published one's."""
+    limits, case = document.limits, case_of(published.design)
+    fitted = fitted_exactly(shipped_experiment(shipped, published.design))
     record = fitted.solution.iterations
     steps, sums = [iteration.step for iteration in record], sums_of_squares(fitted)
     # Further iterations would not change the final sum of squares.
-    later = sums + sums[-1:] * len(progress.sums_of_squares)
-    lines = []
-    for k, published in enumerate(progress.steps, start=1):
-        last = progress.settles and k == len(progress.steps)
-        rule: Rule = "shown" if k in progress.steps_shown_only else "most" if last else "within"
-        lines.append(_line("step", k, published, steps, rule, limits.step))
-    for k, published in enumerate(progress.sums_of_squares):
-        is_close = k < 2 or progress.misfit
-        rule = "shown" if k in progress.sums_shown_only else "within" if is_close else "most"
-        lines.append(_line("S^2", k, published, later, rule, limits.sum_of_squares))
-    settled = fitted.solution.status == "converged"
-    if progress.steps:
-        settled = settled and len(record) - 1 <= len(progress.steps)
-    else:
-        for k in range(1, len(steps)):
-            lines.append(_line("step", k, math.nan, steps, "shown", limits.step))
-        for k in range(len(sums)):
-            lines.append(_line("S^2", k, math.nan, sums, "shown", limits.sum_of_squares))
-    return ComparedProgress(progress, settled, len(record) - 1, tuple(lines))
-
-
-def _line(
-    quantity: str, k: int, published: float, ours: list[float], rule: Rule, limit: float
-) -> ProgressLine:
-    value = ours[k] if k < len(ours) else math.nan
-    rule = "most" if rule == "within" and math.isnan(value) else rule
-    return ProgressLine(f"{quantity} {k}", published, value, rule, limit)
+    sums += sums[-1:] * len(published.sums_of_squares)
+    count = len(published.steps)
+    compared = []
+    if published.settles is not None:
+        settled = fitted.solution.status == "converged" and len(record) - 1 <= (count or math.inf)
+        stated = float(published.settles)
+        words = f"settles within {count}" if count else "settles"
+        compared.append(
+            ComparedValue(
+                published.table, words, case, "", stated, float(settled), (stated, stated)
+            )
+        )
+    for name, values, computed, shown_only, limit, first, most in (
+        (
+            "step",
+            published.steps,
+            steps,
+            published.steps_shown_only,
+            limits.step,
+            1,
+            {count} if published.settles else set(),
+        ),
+        (
+            "S^2",
+            published.sums_of_squares,
+            sums,
+            published.sums_shown_only,
+            limits.sum_of_squares,
+            0,
+            set() if published.misfit else set(range(2, len(sums))),
+        ),
+    ):
+        for k, value in enumerate(values, start=first):
+            if k in shown_only:
+                continue
+            within = 1.0 / limit, math.inf if k in most else limit
+            found = computed[k] if k < len(computed) else math.nan
+            compared.append(
+                ComparedValue(published.table, f"{name} {k}", case, "", value, found, within, 1.0)
+            )
+    return compared
 
 
 def compare_difference(
     document: Document, shipped: Shipped, difference: Difference, trials: int, report: Report
-) -> ComparedDifference:
-    """Compare published differences of two estimators with those of synthetic data sets."""
+) -> list[ComparedValue]:
+    """Compare the published differences of two estimators over one data set with the median over
+    synthetic ones, in whose range they must be.
+    """
     experiment = shipped_experiment(shipped, difference.design)
-    comparison = compare_estimators(experiment, trials, across_probes=True, report=report)
-    return ComparedDifference(difference, comparison, document.statements.limits.median)
+    estimated = compare_estimators(experiment, trials, across_probes=True, report=report)
+    case, limit = case_of(difference.design), document.limits.median
+    compared = [
+        ComparedValue(
+            "", "not converged", case, "", math.nan, float(len(estimated.failed)), (0.0, 0.0)
+        )
+    ]
+    for name, published, values in (
+        ("rms", difference.rms, np.array(estimated.rms)),
+        ("maximum", difference.maximum, np.array(estimated.maximum)),
+    ):
+        below = float((values < published).mean())
+        within = 1.0 / len(values), 1.0 - 1.0 / len(values)
+        compared += [
+            ComparedValue(
+                *("", f"{name} difference", case, "m", published, float(np.median(values))),
+                (1.0 / limit, limit),
+                1.0,
+            ),
+            ComparedValue("", f"{name}, share below", case, "", math.nan, below, within),
+        ]
+    return compared

@@ -5,7 +5,6 @@ comparison.
 from __future__ import annotations
 
 import csv
-from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 from typing import Literal
@@ -19,18 +18,11 @@ SUM_OF_SQUARES = "S^2"
 
 
 class Assumption(Settings):
-    """An assumption that the document does not state; for all sections and quantities if empty."""
+    """An assumption that the document does not state; for all sections if there are none."""
 
     key: str
     text: str
     sections: tuple[str, ...] = ()
-    quantities: tuple[str, ...] = ()
-
-    def concerns(self, section: str, quantity: str) -> bool:
-        """Return whether a quantity of a section depends on it."""
-        return section in (self.sections or (section,)) and quantity in (
-            self.quantities or (quantity,)
-        )
 
 
 class Limits(Settings):
@@ -68,14 +60,6 @@ class Reservation(Settings):
         )
 
 
-class OneSided(Settings):
-    """A quantity whose published values are all on one side of ballplate's."""
-
-    quantity: str
-    statistic: Statistic
-    reason: str
-
-
 class Erratum(Settings):
     """A block of a table, the designs in its heading, and those to which its values belong."""
 
@@ -85,14 +69,6 @@ class Erratum(Settings):
     meant: tuple[str, ...]
     text: str
     figures_of: str | None = None
-
-
-class Illegible(Settings):
-    """A block without a legible value."""
-
-    table: str
-    section: str
-    what: str
 
 
 class RankStatement(Settings):
@@ -147,25 +123,7 @@ class Difference(Settings):
     maximum: float
 
 
-class Statements(Settings):
-    """Statements of a document, except for the values in its tables of uncertainties."""
-
-    title: str
-    sections: tuple[str, ...]
-    assumptions: tuple[Assumption, ...]
-    limits: Limits
-    exceptions: tuple[Reservation, ...]
-    one_sided: tuple[OneSided, ...]
-    errata: tuple[Erratum, ...]
-    illegible: tuple[Illegible, ...]
-    ranks: tuple[RankStatement, ...]
-    remarks: tuple[Remark, ...]
-    convergence: tuple[PublishedIterations, ...]
-    differences: tuple[Difference, ...]
-
-
-@dataclass(frozen=True)
-class PublishedColumn:
+class PublishedColumn(Settings):
     """One column of a printed table: the legible values of U1 to U6, in metres and radians, of a
     design.
     """
@@ -181,12 +139,21 @@ class PublishedColumn:
         return case_of(self.design)
 
 
-@dataclass(frozen=True)
-class Document:
-    """A published document's statements and the columns of its tables."""
+class Document(Settings):
+    """A published document: the columns of its tables of uncertainties, and its statements."""
 
-    statements: Statements
+    title: str
+    sections: tuple[str, ...]
     columns: tuple[PublishedColumn, ...]
+    assumptions: tuple[Assumption, ...]
+    limits: Limits
+    exceptions: tuple[Reservation, ...]
+    errata: tuple[Erratum, ...]
+    illegible: dict[str, str]
+    ranks: tuple[RankStatement, ...]
+    remarks: tuple[Remark, ...]
+    convergence: tuple[PublishedIterations, ...]
+    differences: tuple[Difference, ...]
 
 
 def case_of(design: str) -> str:
@@ -215,14 +182,15 @@ def npl() -> Document:
     name = "npl-cise-15-98"
     folder = files(__package__)
     text = folder.joinpath(f"{name}.yaml").read_text(encoding="utf-8")
-    statements = Statements.model_validate(to_python(parse_tree(text, f"{name}.yaml")))
-    columns = []
-    for row in csv.DictReader(
-        folder.joinpath(f"{name}-tables.csv").read_text(encoding="utf-8").splitlines()
-    ):
-        statistic: Statistic = "maximum" if row["statistic"] == "maximum" else "average"
-        figures = {symbol: float(row[symbol]) for symbol in SYMBOLS if row[symbol]}
-        columns.append(
-            PublishedColumn(row["table"], row["experiment"], row["design"], statistic, figures)
+    columns = [
+        {
+            **{key: row[key] for key in ("table", "design", "statistic")},
+            "section": row["experiment"],
+            "figures": {symbol: float(row[symbol]) for symbol in SYMBOLS if row[symbol]},
+        }
+        for row in csv.DictReader(
+            folder.joinpath(f"{name}-tables.csv").read_text(encoding="utf-8").splitlines()
         )
-    return Document(statements, tuple(columns))
+    ]
+    stated = to_python(parse_tree(text, f"{name}.yaml"))
+    return Document.model_validate({**stated, "columns": tuple(columns)})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 from ballplate.arguments import (
     PathLike,
@@ -48,7 +48,7 @@ def reach(
     """
     from .goals import parse_goal
     from .root_search import reach as search
-    from .unknowns import NAMES
+    from .unknowns import NAMES, UnknownName
 
     ensure_type(str, 'a text such as "U6 average 0.3 um"', goal=goal)
     ensure_type(str, 'a text with a unit, such as "0.5 um"', target=target)
@@ -58,7 +58,7 @@ def reach(
     ensure_report(report)
     names = (unknowns,) if isinstance(unknowns, str) else tuple(unknowns or NAMES)
     for name in names:
-        ensure_one_of(NAMES, unknowns=name)
+        ensure_one_of(get_args(UnknownName), unknowns=name)
     chosen = experiment_of(experiment)
     return search(
         with_pool(chosen) if "hours" in names else chosen,

@@ -13,9 +13,8 @@ from typing import Literal, get_args
 from ballplate.simulator.experiment import Experiment, node_at, override
 from ballplate.simulator.geometry import GridSettings, SquareSettings
 from ballplate.simulator.inputs import (
-    BASE_UNITS,
+    KINDS,
     QUANTITY,
-    UNITS,
     LengthFunction,
     Mapping,
     Node,
@@ -213,9 +212,9 @@ def _scaled(name: UnknownName, title: str, root: Node, paths: list[str]) -> Unkn
     leaves = [leaf for node in nodes if node is not None for leaf in _leaves(node)]
     first, unit, scale = leaves[0], "m", 1.0
     if isinstance(first, _Quantity):
-        kind = next(kind for kind, units in UNITS.items() if plain_unit(first.unit) in units)
-        lead, unit = first.number, BASE_UNITS[kind]
-        scale = float(UNITS[kind][plain_unit(first.unit)])
+        plain = plain_unit(first.unit)
+        kind = next(kind for kind in KINDS.values() if plain in kind.units)
+        lead, unit, scale = first.number, kind.base, float(kind.units[plain])
     else:
         lead = exact(first.constant or first.slope)
 
@@ -264,7 +263,9 @@ def _leaf(value: object) -> LengthFunction | _Quantity:
         return parse_length_function(value)
     except QuantityError:
         match = QUANTITY.fullmatch(value.strip()) if isinstance(value, str) else None
-        is_length = match is not None and plain_unit(match[2] or "") in chain(*UNITS.values())
+        is_length = match is not None and plain_unit(match[2] or "") in chain(
+            *(kind.units for kind in KINDS.values())
+        )
         if match is None or not is_length or Decimal(match[1]) <= 0:
             raise
         return _Quantity(Decimal(match[1]), match[2].strip())

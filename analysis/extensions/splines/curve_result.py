@@ -1,42 +1,55 @@
-"""An error curve from a file of points, as it shows itself."""
+"""An error curve as it shows itself: text, plain data, polynomials for a controller."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import io
+import math
+from argparse import Namespace
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
-from ballplate.presentation import Data, Result
-from ballplate.simulator.inputs import ExperimentError, Message
+from ballplate.presentation import Data, MainTable, Result, aligned, picked, records
+from ballplate.simulator.computing import comparable
+from ballplate.simulator.inputs import (
+    CsvWriter,
+    ExperimentError,
+    Message,
+    listing,
+    number_of,
+    refused,
+)
 from ballplate.simulator.machines import Array
-from ballplate.simulator.splines import Powers, SplineError
+from ballplate.simulator.splines import SplineError, pieces
 
-from .compensated_points import CompensatedPoints, compensated_points, nominal_points
-from .curve_options import Asked, curve_settings, listed, positive
-from .curve_tables import coefficients_csv, curve_data, curve_lines, shown
-from .error_curve import ErrorCurve, fit_curve
+from .compensated_points import compensated_csv
+from .error_curve import SIDES, ErrorCurve, fit_curve
 from .error_curve_plots import draw_curve, draw_whiskers
-from .read_points import Column, CurvePoints, choose_points, read_points
+from .profile import Profile
+from .read_points import choose_points, read_points
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+MOST_LISTED = 12
+# What adds less to the curve than this part of its size is rounding.
+NOTHING = 1e-13
+UNITS = ("µm", "µm/mm", "µm/mm^2", "µm/mm^3")
+# From metres to these units.
+FACTORS = 1e6 * 1e-3 ** np.arange(4.0)
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FittedCurve(Result):
-    """A fitted `curve` with its values at the places `at` (m,), in metres or radians.
-
-    `everything` are all points of the file, those of the curve among them; `powers` says in what
-    its polynomials are.
+    """A fitted `curve` through points of a file; its polynomials are in the distance from the
+    start of each piece if `local`, otherwise in the abscissa.
     """
 
     file: Path
     curve: ErrorCurve
-    everything: CurvePoints
-    at: Array
-    powers: Powers
+    local: bool
 
     @property
     def label(self) -> str:
@@ -45,52 +58,79 @@ class FittedCurve(Result):
     @property
     def title(self) -> str:
         points = self.curve.points
-        return f"{points.y_column.words} against {points.x_column.words}"
+        return f"{points.y_name} against {points.x_name}".replace("_", " ")
 
     def headline(self) -> str:
         fitted = self.curve.fit
         return f"{len(fitted.x)} points, {fitted.free} free coefficients"
 
     def lines(self) -> list[str]:
-        return curve_lines(self.curve, self.file.name, self.powers, self.at)
+        heading = f"{self.file.name}: {self.title}"
+        return [*_curve_lines(self.curve, heading), "", *self._piece_lines()]
 
     def data(self) -> Data:
-        return curve_data(self.curve, str(self.file), self.powers, self.at)
+        curve, fitted, space = self.curve, self.curve.fit, self.curve.fit.space
+        return {
+            "file": str(self.file),
+            **picked(curve.points, "x_name", "y_name"),
+            "knots": space.knots,
+            "start": space.lower,
+            "end": space.upper,
+            **picked(curve, "boundaries", "corners", "coverage_factor"),
+            **picked(fitted, "sigma", "degrees_of_freedom", "sum_of_squares"),
+            "prescribed": [picked(held, "at", "derivative", "value") for held in curve.prescribed],
+            "free_coefficients": fitted.free,
+            "powers": "local" if self.local else "global",
+            "pieces": records(
+                start=space.breaks[:-1],
+                end=space.breaks[1:],
+                coefficients=pieces(fitted, self.local),
+            ),
+            "points": records(
+                point=curve.points.names,
+                x=fitted.x,
+                y=fitted.y,
+                curve=fitted.y - fitted.residuals,
+                residual=fitted.residuals,
+                standard_uncertainty=curve.standard_uncertainty(fitted.x),
+            ),
+        }
 
-    def rows(self) -> list[Data]:
-        """One row for each point, in metres and radians."""
-        points = self.curve.points
-        units = {"x unit": _unit(points.x_column.kind), "y unit": _unit(points.y_column.kind)}
-        return [
-            {name.replace("_", " "): value for name, value in point.items()} | units
-            for point in self.to_dict()["points"]
-        ]
+    def columns(self) -> MainTable:
+        """One row for each point."""
+        rows = self.data()["points"]
+        units = {"point": "", "x": ", mm"}
+        heads = {name: f"{name.replace('_', ' ')}{units.get(name, ', µm')}" for name in rows[0]}
+        return {head: [row[name] for row in rows] for name, head in heads.items()}, ()
 
     def values(self, x: Array, derivative: int = 0) -> Array:
-        """Values of the curve (m,), or of a derivative, in metres and radians.
+        """Values of the curve (m,), or of a derivative, in metres.
 
         :raises SplineError: an x beyond its ends.
         """
         return self.curve.fit.values(np.asarray(x, float), derivative)
 
     def coefficients(self) -> str:
-        """The polynomials of all pieces as CSV at full precision, in the units of the file."""
-        return coefficients_csv(self.curve, self.powers)
+        """The polynomials as CSV at full precision, in millimetres and micrometres."""
+        text = io.StringIO()
+        name = self.curve.points.y_name
+        text.write(f"# {name} = c0 + c1 u + c2 u^2 + c3 u^3, where u is the {self._variable()}\n")
+        writer = CsvWriter(text)
+        units = ("um", "um_per_mm", "um_per_mm2", "um_per_mm3")
+        writer.writerow(["start_mm", "end_mm", *(f"c{k}_{unit}" for k, unit in enumerate(units))])
+        for start, end, polynomial in self._pieces():
+            writer.writerow([repr(value) for value in (start, end, *polynomial.tolist())])
+        return text.getvalue()
 
-    def compensated(self, nominal: str | Path | None = None) -> CompensatedPoints:
-        """The points of the curve, or nominal points of a CSV file on the same profile, moved
-        against the errors that the curve has there, and its corners.
+    def compensated(self) -> str:
+        """The points of the curve moved against its errors, and its corners, as CSV.
 
-        :raises ExperimentError: the file is invalid, or a point is not on the profile.
+        :raises ExperimentError: there is no profile, or a corner is hardly one.
         """
-        points = self.curve.points
         try:
-            if nominal is not None:
-                return compensated_points(self.curve, *nominal_points(Path(nominal)))
-            places = np.zeros((0, 2)) if points.places is None else points.places
-            return compensated_points(self.curve, points.names, places, points.normals)
+            return compensated_csv(self.curve, self._profile())
         except SplineError as error:
-            raise _told(error, Path(nominal or self.file), points.x_column) from None
+            raise _placed(error, self.file) from None
 
     def plot(self, path: str | Path | None = None) -> Figure:
         """Points, curve, its expanded uncertainty, knots and boundaries.
@@ -100,67 +140,119 @@ class FittedCurve(Result):
         :raises ImportError: matplotlib is missing.
         :raises ValueError: the path ends in something else.
         """
-        return draw_curve(self.curve, path)
+        return draw_curve(self.curve, self.title, path)
 
     def plot_whiskers(self, path: str | Path | None = None) -> Figure:
-        """The errors of all points of the file as bars normal to their profile.
+        """The errors of the points as bars normal to their profile.
 
         :raises ImportError: matplotlib is missing.
-        :raises ValueError: the path ends in something else, or there is no profile.
-        :raises ExperimentError: two neighbouring points are at the same place.
+        :raises ValueError: the path ends in something else.
+        :raises ExperimentError: there is no profile.
         """
-        if self.everything.places is None:
-            raise ValueError("bars need a profile, of the columns nominal_x_mm and nominal_z_mm")
-        try:
-            return draw_whiskers(self.curve, self.everything, path)
-        except SplineError as error:
-            raise _told(error, self.file, self.everything.x_column) from None
+        return draw_whiskers(self.curve, self._profile(), path)
+
+    def _profile(self) -> Profile:
+        if self.curve.profile is None:
+            text = (
+                "errors are normal to a profile whose arc length is the abscissa; add the columns"
+            )
+            raise refused(self.file, f"{text} nominal_x_mm and nominal_z_mm, and leave --x out")
+        return self.curve.profile
+
+    def _variable(self) -> str:
+        start = " less the start of the piece" if self.local else ""
+        return f"{self.curve.points.x_name.replace('_', ' ')}{start}"
+
+    def _pieces(self) -> Iterator[tuple[float, float, Array]]:
+        """Start and end of each piece in millimetres, and its coefficients in micrometres."""
+        breaks = (1e3 * self.curve.fit.space.breaks).tolist()
+        return zip(breaks, breaks[1:], pieces(self.curve.fit, self.local) * FACTORS, strict=False)
+
+    def _piece_lines(self) -> list[str]:
+        size = NOTHING * 1e6 * float(np.abs(self.curve.fit.coefficients).max())
+        rows = [["from", "to", "1", "u^1", "u^2", "u^3"], ["mm", "mm", *UNITS]]
+        for start, end, polynomial in self._pieces():
+            length = end - start if self.local else max(abs(start), abs(end))
+            numbers = [
+                "0" if abs(value) * length**k < size else f"{value:.7g}"
+                for k, value in enumerate(polynomial)
+            ]
+            rows.append([f"{start:.6g}", f"{end:.6g}", *numbers])
+        head = f"polynomials of u, the {self._variable()}, in mm; their coefficients of"
+        return [head, *aligned(rows, [True] * 6)]
 
 
-def _unit(kind: str) -> Literal["m", "rad"]:
-    return "m" if kind == "length" else "rad"
+def _curve_lines(curve: ErrorCurve, heading: str) -> list[str]:
+    fitted, points, space = curve.fit, curve.points, curve.fit.space
+    lines = [
+        f"{heading}, {len(fitted.x)} points, curve from {mm(space.lower)} to {mm(space.upper)}"
+    ]
+    knots = ", ".join(f"{1e3 * knot:.6g}" for knot in curve.knots[:MOST_LISTED])
+    more = f" and {len(curve.knots) - MOST_LISTED} more" if len(curve.knots) > MOST_LISTED else ""
+    where = f" at {knots} mm{more}" if knots else ""
+    lines.append(
+        f"cubic spline, {number_of(len(curve.knots), 'knot')}{where};"
+        f" {number_of(fitted.free, 'free coefficient')},"
+        f" {fitted.degrees_of_freedom} degrees of freedom"
+    )
+    lines += [f"features share value and slope at {mm(place)}" for place in curve.boundaries]
+    for corner in curve.corners:
+        sides = [um(fitted.values(np.array([corner]), 0, side)[0], 4) for side in SIDES]
+        lines.append(
+            f"features meet at a corner at {mm(corner)}, with errors {' and '.join(sides)}"
+        )
+    if len(set(points.features)) > 1 and not curve.boundaries and not curve.corners:
+        names = listing(dict.fromkeys(points.features))
+        lines.append(
+            f"one curve over {names}: the column feature makes no boundaries; --boundary does"
+        )
+    lines += [f"feature {k} is a straight line" for k in curve.straight]
+    for held in curve.prescribed:
+        value = held.value * FACTORS[held.derivative] + 0.0
+        amount = f"{value:.6g} {UNITS[held.derivative]}" if value else "0"
+        lines.append(f"prescribed: {held.name} {amount} at {mm(held.at)}")
+    if math.isnan(fitted.sigma):
+        lines.append("no degrees of freedom are left to estimate sigma from")
+    else:
+        places = np.linspace(space.lower, space.upper, 501)
+        spread = curve.standard_uncertainty(places)
+        worst = int(np.argmax(comparable(spread)))
+        lines += [
+            f"sigma {um(fitted.sigma, 4)}, estimated from the residuals",
+            f"standard uncertainty of the curve: median {um(float(np.median(spread)), 3)}, largest"
+            f" {um(spread[worst], 3)} at {mm(places[worst], 4)}; {curve.coverage_factor:.3g} times"
+            " that for 95 %",
+        ]
+    worst_points = np.argsort(-comparable(np.abs(fitted.residuals)), kind="stable")[:3]
+    worst_residuals = [
+        f"{um(fitted.residuals[k], 3)} at point {points.names[k]}" for k in worst_points
+    ]
+    return [*lines, f"largest residuals: {', '.join(worst_residuals)}"]
 
 
-def _told(error: SplineError, file: Path, column: Column) -> ExperimentError:
-    """The problems with places in the unit of the abscissa."""
-    texts = [problem.told(lambda place: shown(place, column)) for problem in error.problems]
+def mm(place: float, digits: int = 6) -> str:
+    return f"{1e3 * place + 0.0:.{digits}g} mm"
+
+
+def um(error: float, digits: int) -> str:
+    return f"{1e6 * error + 0.0:.{digits}g} µm"
+
+
+def _placed(error: SplineError, file: Path) -> ExperimentError:
+    """The problems with places in millimetres."""
+    texts = [problem.told(mm) for problem in error.problems]
     return ExperimentError(Message(str(file), 0, 0, "", text) for text in texts)
 
 
-def error_curve(
-    file: Path,
-    x: str | None = None,
-    y: str | None = None,
-    points: str | None = None,
-    asked: Asked | None = None,
-    sigma: str | None = None,
-    powers: Powers = "local",
-    check: Callable[[CurvePoints], None] = lambda points: None,
-) -> FittedCurve:
-    """The curve that is asked for, through the points of a file or some of them.
-
-    `check` may refuse points before anything is fitted.
+def error_curve(file: Path, wanted: Namespace) -> FittedCurve:
+    """The curve that the options of `ballplate spline` want, through the points of a file.
 
     :raises ExperimentError: the file is invalid, or there is no such curve.
-    :raises OptionError: a text that does not say what it should.
     """
-    asked = asked or Asked()
-    everything = read_points(file, x, y)
-    chosen = everything
-    if points is not None:
-        chosen = everything.chosen(choose_points(everything, points, str(file)))
-    settings = curve_settings(asked, chosen)
-    uncertainty = (
-        None if asked.uncertainty is None else positive(asked.uncertainty, chosen.y_column)
-    )
-    column = chosen.x_column
-    evaluated = np.array(
-        listed("--evaluate", asked.evaluate, column) if asked.evaluate else [], float
-    )
-    check(chosen)
+    points = read_points(file, wanted.x, wanted.y)
+    if wanted.points is not None:
+        points = points.chosen(choose_points(points, wanted.points, str(file)))
     try:
-        curve = fit_curve(chosen, settings, uncertainty, sigma)
-        curve.fit.values(evaluated)
+        return FittedCurve(file, fit_curve(points, wanted), wanted.powers == "local")
     except SplineError as error:
-        raise _told(error, file, column) from None
-    return FittedCurve(file, curve, everything, evaluated, powers)
+        raise _placed(error, file) from None

@@ -13,7 +13,6 @@ from ballplate.presentation import (
     SERIES,
     common_legend,
     drawing,
-    micro,
     placed_axes,
     round_number,
     save,
@@ -22,9 +21,8 @@ from ballplate.presentation import (
 )
 from ballplate.simulator.computing import comparable
 
-from .curve_tables import derivative_unit, shown
-from .error_curve import ErrorCurve, whole_profile
-from .read_points import CurvePoints
+from .error_curve import ErrorCurve
+from .profile import Profile
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -35,55 +33,46 @@ WIDTH, HEIGHT = 460.0, 300.0
 LONGEST = 0.18
 
 
-def draw_curve(curve: ErrorCurve, path: str | Path | None = None) -> Figure:
+def draw_curve(curve: ErrorCurve, title: str, path: str | Path | None = None) -> Figure:
     """Points, curve, its expanded uncertainty, knots and boundaries as a picture, which is written
     to the path if there is one.
 
     :raises OSError: the file cannot be written.
     """
-    fitted, x, y = curve.fit, curve.points.x_column, curve.points.y_column
-    lower, upper = fitted.space.lower, fitted.space.upper
+    fitted, space = curve.fit, curve.fit.space
     places = np.unique(
-        np.concatenate([np.linspace(lower, upper, 501), fitted.x, fitted.space.breaks])
+        np.concatenate([np.linspace(space.lower, space.upper, 501), fitted.x, space.breaks])
     )
-    values, spread = (
-        fitted.values(places),
-        curve.coverage_factor * curve.standard_uncertainty(places),
-    )
+    values = 1e6 * fitted.values(places)
+    spread = 1e6 * curve.coverage_factor * curve.standard_uncertainty(places)
     with drawing(HEIGHT, WIDTH) as figure:
         axes = placed_axes(figure, 54.0, 42.0, WIDTH - 68.0, HEIGHT - 92.0)
         axes.grid(True)
         if np.isfinite(spread).all():
             axes.fill_between(
-                places / x.factor,
-                (values - spread) / y.factor,
-                (values + spread) / y.factor,
+                1e3 * places,
+                values - spread,
+                values + spread,
                 color=SERIES[0],
                 alpha=0.2,
                 linewidth=0,
                 label="expanded uncertainty, 95 %",
             )
-        axes.plot(places / x.factor, values / y.factor, color=SERIES[0], label="spline")
-        bars = fitted.uncertainties * curve.sigma / y.factor if curve.has_uncertainties else None
-        axes.errorbar(
-            fitted.x / x.factor,
-            fitted.y / y.factor,
-            bars,
+        axes.plot(1e3 * places, values, color=SERIES[0], label="spline")
+        axes.plot(
+            1e3 * fitted.x,
+            1e6 * fitted.y,
             color=INK,
             marker="o",
             markersize=4.0,
             linestyle="none",
             markerfacecolor=PAPER,
-            elinewidth=1.0,
             label="measured",
         )
-        knots = np.array(
-            [knot for knot in fitted.space.knots if knot not in (*curve.boundaries, *curve.corners)]
-        )
-        if len(knots):
+        if curve.knots:
             axes.plot(
-                knots / x.factor,
-                fitted.values(knots) / y.factor,
+                1e3 * np.array(curve.knots),
+                1e6 * fitted.values(np.array(curve.knots)),
                 color=SERIES[1],
                 marker="|",
                 markersize=14.0,
@@ -93,43 +82,30 @@ def draw_curve(curve: ErrorCurve, path: str | Path | None = None) -> Figure:
         for k, boundary in enumerate((*curve.boundaries, *curve.corners)):
             label = "boundary of features" if k == 0 else None
             axes.axvline(
-                boundary / x.factor, color=SERIES[1], linestyle="--", linewidth=1.0, label=label
+                1e3 * boundary, color=SERIES[1], linestyle="--", linewidth=1.0, label=label
             )
-        axes.set_xlabel(f"{x.words}, {micro(x.unit)}")
-        axes.set_ylabel(f"{y.words}, {micro(y.unit)}")
+        axes.set_xlabel(f"{curve.points.x_name.replace('_', ' ')}, mm")
+        axes.set_ylabel(f"{curve.points.y_name.replace('_', ' ')}, µm")
         common_legend(figure, axes, loc="upper center", ncols=3, borderaxespad=0.3)
-        return save(figure, path, words(curve))
+        low, high = places[np.argmin(values)], places[np.argmax(values)]
+        return save(
+            figure,
+            path,
+            f"{title}: {len(fitted.x)} points and a spline from {values.min():.3g} µm at"
+            f" {1e3 * low:.3g} mm to {values.max():.3g} µm at {1e3 * high:.3g} mm",
+        )
 
 
-def words(curve: ErrorCurve) -> str:
-    """The plot for those who do not see it."""
-    fitted, x, y = curve.fit, curve.points.x_column, curve.points.y_column
-    places = np.linspace(fitted.space.lower, fitted.space.upper, 501)
-    values = fitted.values(places)
-    high, low = int(np.argmax(values)), int(np.argmin(values))
-    slope = fitted.values(places[:1], 1)[0] / y.factor * x.factor
-    return (
-        f"{y.words} against {x.words}: {len(fitted.x)} points and a spline from"
-        f" {shown(values[low], y, 3)} at {shown(places[low], x, 3)} to {shown(values[high], y, 3)}"
-        f" at {shown(places[high], x, 3)}; slope at the start {slope:.2g}"
-        f" {derivative_unit(curve, 1)}"
-    )
+def draw_whiskers(curve: ErrorCurve, profile: Profile, path: str | Path | None = None) -> Figure:
+    """The errors of the points as bars normal to the profile; the picture is written to the path,
+    if there is one.
 
-
-def draw_whiskers(curve: ErrorCurve, points: CurvePoints, path: str | Path | None = None) -> Figure:
-    """The errors of all points of the file as bars normal to the profile, those of the fit in
-    front; the picture is written to the path, if there is one.
-
-    :raises SplineError: neighbouring points that stand at the same place.
     :raises OSError: the file cannot be written.
     """
-    profile, whole = whole_profile(points, curve.profile_boundaries, len(curve.settings.corners))
-    assert points.places is not None
+    points, at = curve.points, np.searchsorted(profile.lengths, curve.fit.x)
     # Axial co-ordinate to the right, radius upwards, as a turning centre is looked at.
-    line, start = profile.places[:, ::-1], points.places[:, ::-1]
-    normals = (profile.normals[whole] if points.normals is None else points.normals)[:, ::-1]
-    factor = points.x_column.factor if points.x is None else 1e-3
-    unit = points.x_column.unit if points.x is None else "mm"
+    line, normals = profile.places[:, ::-1], profile.normals[at, ::-1]
+    start = line[at]
     extent = np.ptp(line, axis=0)
     largest = float(np.abs(points.y).max())
     magnification = round_number(LONGEST * float(extent.max()) / largest) if largest else 1.0
@@ -145,44 +121,41 @@ def draw_whiskers(curve: ErrorCurve, points: CurvePoints, path: str | Path | Non
     with drawing(height + 90.0, WIDTH) as figure:
         axes = placed_axes(figure, 54.0, 42.0, width, height)
         axes.set_aspect("equal")
-        axes.set_xlim((low[0] - margin) / factor, (high[0] + margin) / factor)
-        axes.set_ylim((low[1] - margin) / factor, (high[1] + margin) / factor)
+        axes.set_xlim(1e3 * (low[0] - margin), 1e3 * (high[0] + margin))
+        axes.set_ylim(1e3 * (low[1] - margin), 1e3 * (high[1] + margin))
         axes.plot(
-            *(_outline(profile.places, profile.features).T / factor),
+            *(1e3 * _outline(profile).T),
             color=MUTED,
             linewidth=1.2,
             label="profile",
         )
-        fitted = set(curve.points.names)
-        inside = np.array([name in fitted for name in points.names])
-        for chosen, colour, label in ((inside, SERIES[0], "fitted"), (~inside, INK, "not fitted")):
-            if chosen.any():
-                sticks(
-                    axes,
-                    start[chosen] / factor,
-                    tips[chosen] / factor,
-                    color=colour,
-                    linewidth=1.2,
-                    marker="o",
-                    markersize=2.5,
-                    label=label if not inside.all() else "error",
-                )
-        scale_bar(axes, scale * magnification / factor, 0.08, f"{scale * 1e6:g} µm")
-        axes.set_xlabel(f"axial co-ordinate, {unit}")
-        axes.set_ylabel(f"radius, {unit}")
-        title = f"{points.y_column.words}, magnified {magnification:g} times"
+        sticks(
+            axes,
+            1e3 * start,
+            1e3 * tips,
+            color=SERIES[0],
+            linewidth=1.2,
+            marker="o",
+            markersize=2.5,
+            label="error",
+        )
+        scale_bar(axes, 1e3 * scale * magnification, 0.08, f"{scale * 1e6:g} µm")
+        axes.set_xlabel("axial co-ordinate, mm")
+        axes.set_ylabel("radius, mm")
+        name = points.y_name.replace("_", " ")
+        title = f"{name}, magnified {magnification:g} times"
         common_legend(figure, axes, loc="upper center", ncols=3, borderaxespad=0.3, title=title)
         worst = int(np.argmax(comparable(np.abs(points.y))))
-        heading = f"{points.y_column.words} as bars normal to a profile of {len(points.y)} points"
-        largest_told = f"the largest is {shown(points.y[worst], points.y_column, 4)}"
-        return save(figure, path, f"{heading}, magnified {magnification:g} times; {largest_told}")
+        heading = f"{name} as bars normal to a profile of {len(points.y)} points"
+        told = f"the largest is {1e6 * points.y[worst]:.4g} µm"
+        return save(figure, path, f"{heading}, magnified {magnification:g} times; {told}")
 
 
-def _outline(places: np.ndarray, features: tuple[tuple[int, int], ...]) -> np.ndarray:
+def _outline(profile: Profile) -> np.ndarray:
     """Axial co-ordinate and radius of the profile's line, with gaps between features that share no
     place.
     """
     parts = []
-    for first, last in features:
-        parts += [places[first : last + 1, ::-1], np.full((1, 2), np.nan)]
+    for first, last in profile.features:
+        parts += [profile.places[first : last + 1, ::-1], np.full((1, 2), np.nan)]
     return np.concatenate(parts)

@@ -2,58 +2,53 @@
 
 from __future__ import annotations
 
-import re
+from argparse import ArgumentError, ArgumentParser
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
-from ballplate.arguments import (
-    SIGMAS,
-    PathLike,
-)
-from ballplate.simulator.inputs import ensure_one_of, ensure_path, ensure_type
+from ballplate.arguments import PathLike
+from ballplate.simulator.inputs import ensure_path, hint
 
 if TYPE_CHECKING:
     from .curve_result import FittedCurve
 
 
-def spline(
-    file: PathLike,
-    x: str | None = None,
-    y: str | None = None,
-    points: str | None = None,
-    sigma: Literal["estimated", "given"] | None = None,
-    powers: Literal["local", "global"] = "local",
-    **wanted: Any,
-) -> FittedCurve:
+def spline(file: PathLike, **wanted: Any) -> FittedCurve:
     """A spline with prescribed values and slopes through the measured errors of a CSV file.
 
-    `x` and `y` are columns, and `points` names those that are used. What curve is `wanted` is said
-    as by the options of `ballplate spline`: order, every, knots, start, end, boundary, straight,
-    start_value, start_slope, end_value, end_slope, at, periodic, period, uncertainty and evaluate,
-    in texts with units.
+    What curve is `wanted` is said as by the options of `ballplate spline`: x, y, points, every,
+    knots, start, end, boundary, corner, straight, start_value, start_slope, end_value, end_slope
+    and powers, in texts with units; options that may be repeated are lists.
+
+    :raises TypeError: another name, or no list where one is needed.
+    :raises ValueError: a value that the command refuses.
 
     >>> import ballplate as bp
     >>> table = "designs/gilsinn/table-1.csv"
-    >>> bp.spline(table, "arc_length", "finish_error", "12-32", start_slope="0")
+    >>> bp.spline(table, y="finish_error", points="12-32", start_slope="0")
     <FittedCurve of table-1: 21 points, 7 free coefficients>
     """
-    from .curve_options import Asked, OptionError, ensure_asked
     from .curve_result import error_curve
+    from .spline_command import add_curve
 
     ensure_path("file", file)
-    ensure_type(str, "the name of a column", x=x, y=y)
-    ensure_type(str, 'names of points such as "12-32"', points=points)
-    ensure_one_of(SIGMAS, sigma=sigma)
-    ensure_one_of(("local", "global"), powers=powers)
-    ensure_asked(wanted)
+    parser = ArgumentParser(exit_on_error=False)
+    add_curve(parser)
+    defaults = vars(parser.parse_args([]))
+    arguments = []
+    for name, value in wanted.items():
+        if name not in defaults:
+            raise TypeError(f'"{name}" is unknown; {hint(name, defaults)}')
+        values = [] if value is None else [value]
+        if isinstance(defaults[name], list):
+            if isinstance(value, str) or not isinstance(value, Sequence):
+                raise TypeError(f"{name}={value!r}; give a list")
+            values = list(value)
+        arguments += [f"--{name.replace('_', '-')}={given}" for given in values]
     try:
-        return error_curve(Path(file), x, y, points, Asked(**wanted), sigma, powers)
-    except OptionError as error:
+        return error_curve(Path(file), parser.parse_args(arguments))
+    except ArgumentError as error:
         # Options are arguments here.
-        named = re.sub(r"--([a-z]+)-?([a-z]*)", _argument, str(error))
-        raise ValueError(named) from None
-
-
-def _argument(option: re.Match[str]) -> str:
-    """The name of an argument for that of an option."""
-    return "_".join(filter(None, option.groups()))
+        name = str(error.argument_name).lstrip("-").replace("-", "_")
+        raise ValueError(f"{name}: {error.message}") from None

@@ -23,8 +23,6 @@ Complex = NDArray[np.complex128]
 DETOUR = 0.05
 # The same of a corner, which may be sharp and nearer to one of the two places.
 CORNER_DETOUR = 1.0
-# How far from the profile a place may be that lies on it, as a part of the distance between points.
-BESIDE = 0.01
 
 
 class NotOnProfileError(ValueError):
@@ -81,48 +79,10 @@ class Profile:
 
     @cached_property
     def _outward(self) -> float:
-        """True if a tangent that is turned to the left points out of the material, 1 or -1: that
-        is on the side of the axis.
+        """1 if a tangent that is turned to the left points out of the material, otherwise -1: the
+        axis is on the side of the material.
         """
         return -1.0 if (self._turned.imag * self.places[:, 0]).sum() < 0 else 1.0
-
-    def located(self, place: Array) -> tuple[float, Array]:
-        """Arc length of a place (2,) on the profile, and the unit normal (2,) out of the material.
-
-        A place that two features share has the normal of the latter; between two features that
-        share none there is no profile.
-
-        :raises NotOnProfileError: it is not on the profile.
-        """
-        same = np.flatnonzero((self.places == place).all(axis=1))
-        if len(same):
-            return float(self.lengths[same[0]]), self.normals[same[0]]
-        q = complex(place[1], place[0])
-        before, after = np.abs(self._points[:-1] - q), np.abs(self._points[1:] - q)
-        steps = np.abs(np.diff(self._points))
-        detour = (before + after - steps) / steps
-        k = int(np.argmin(detour)) if len(detour) else 0
-        ends = [feature for feature in self.features if feature[0] <= k < feature[1]]
-        if not ends or detour[k] > DETOUR:
-            raise NotOnProfileError
-        first, last = ends[0]
-        curvature = 0.0
-        if last - first >= 2:
-            curvatures = _curvatures(self._points[first : last + 1])
-            curvature = 0.5 * float(curvatures[k - first] + curvatures[k - first + 1])
-        parts = [_arc(float(feature[k]), curvature) for feature in (before, after)]
-        share = parts[0] / sum(parts)
-        half = np.arcsin(np.clip(0.5 * curvature * steps[k], -1.0, 1.0))
-        chord = (self._points[k + 1] - self._points[k]) / steps[k]
-        # From the first end the chord to a point of the arc turns by half of what the arc does.
-        on_arc = self._points[k] + chord * np.exp(1j * half * (share - 1.0)) * (
-            steps[k] * (share if half == 0.0 else np.sin(half * share) / np.sin(half))
-        )
-        if abs(q - on_arc) > BESIDE * steps[k]:
-            raise NotOnProfileError
-        tangent = chord * np.exp(1j * half * (2.0 * share - 1.0))
-        length = self.lengths[k] + share * (self.lengths[k + 1] - self.lengths[k])
-        return float(length), _as_pairs(np.array([self._outward * 1j * tangent]))[0]
 
     def beside(self, place: Array) -> tuple[Array, Array]:
         """Unit normals out of the material and unit tangents along the profile, each (2, 2), of the
@@ -162,12 +122,6 @@ class Profile:
 def _as_pairs(numbers: Complex) -> Array:
     """Radius and axial co-ordinate (m, 2) of complex numbers (m,)."""
     return np.stack([numbers.imag, numbers.real], axis=1)
-
-
-def _arc(chord: float, curvature: float) -> float:
-    """Length of the arc over a chord."""
-    bend = min(max(0.5 * chord * curvature, -1.0), 1.0)
-    return chord if bend == 0.0 else chord * float(np.arcsin(bend)) / bend
 
 
 def _curvatures(points: Complex) -> Array:

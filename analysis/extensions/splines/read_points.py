@@ -4,80 +4,45 @@ error.
 
 from __future__ import annotations
 
-import math
-import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from fractions import Fraction
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from ballplate.simulator.inputs import (
-    ANGLE_UNITS,
     LENGTH_UNITS,
-    MORE_ERRORS,
-    MOST_MESSAGES,
-    MOST_ROWS,
-    ExperimentError,
-    Mark,
-    Message,
-    QuantityError,
-    TableLine,
-    decimal_sign,
-    exact_number,
     header_cells,
     hint,
     listing,
-    read_number,
+    read_table,
     refused,
-    shorten,
     table_lines,
-    wrong_count,
 )
 from ballplate.simulator.machines import Array
 
 EXAMPLE = "position_mm,error_um"
-PROFILES = (("nominal_x", "nominal_z"), ("x", "z"))
-NORMALS = ("normal_x", "normal_z")
-POINT, FEATURE, UNCERTAINTY, ARC_LENGTH = "point", "feature", "u", "arc_length"
+PROFILE = ("nominal_x", "nominal_z")
+TEXTS = ("point", "feature")
+ARC_LENGTH = "arc_length"
 MOST_POINTS = 20_000
-NO_TABLES = (".yaml", ".yml", ".json")
-
-
-@dataclass(frozen=True)
-class Column:
-    """A column with a unit: its name without it, and how many metres or radians the unit is."""
-
-    name: str
-    unit: str
-    factor: float
-    kind: Literal["length", "angle"]
-
-    @property
-    def words(self) -> str:
-        """The name in a sentence."""
-        return self.name.replace("_", " ")
 
 
 @dataclass(frozen=True)
 class CurvePoints:
-    """Points in the order of the file, in metres and radians.
+    """Points in the order of the file, in metres.
 
     `x` (m,) is not there where the abscissa is the arc length along the profile; `places` (m, 2),
-    radius and axial co-ordinate, are not there where the file has no profile, unit `normals` (m, 2)
-    where it does not state them.
+    radius and axial co-ordinate, are not there where the file has no profile. `x_name` and `y_name`
+    name abscissa and error.
     """
 
     names: tuple[str, ...]
     features: tuple[str, ...]
-    x_column: Column
-    y_column: Column
+    x_name: str
+    y_name: str
     x: Array | None = field(repr=False)
     y: Array = field(repr=False)
-    uncertainties: Array | None = field(repr=False)
     places: Array | None = field(repr=False)
-    normals: Array | None = field(default=None, repr=False)
 
     def chosen(self, indices: Sequence[int]) -> CurvePoints:
         """Those of some indices."""
@@ -85,141 +50,94 @@ class CurvePoints:
         return CurvePoints(
             tuple(self.names[k] for k in index),
             tuple(self.features[k] for k in index),
-            self.x_column,
-            self.y_column,
+            self.x_name,
+            self.y_name,
             None if self.x is None else self.x[index],
             self.y[index],
-            None if self.uncertainties is None else self.uncertainties[index],
             None if self.places is None else self.places[index],
-            None if self.normals is None else self.normals[index],
         )
 
 
-# In one piece: one pass over the lines collects all points and all that is wrong with them.
 def read_points(path: Path, x: str | None = None, y: str | None = None) -> CurvePoints:
     """Read points from a file whose first line names the columns, each with its unit, such as
     position_mm,error_um.
 
     `x` and `y` choose columns, with or without the unit. Without `x` the abscissa is the arc
-    length along the profile if the file has the columns nominal_x and nominal_z (or x and z),
-    otherwise the first column with a unit; without `y` the error is the only column left. `point`
-    and `feature` are texts, `u` a standard uncertainty of the error, `normal_x` and `normal_z`,
-    without unit, the direction out of the material. Other columns are not read.
+    length along the profile if the file has the columns nominal_x and nominal_z, otherwise the
+    first column with a unit; without `y` the error is the only column left. `point` and `feature`
+    are texts.
 
     :raises ExperimentError: all faults of the file at once.
     """
-    file = str(path)
-    if path.suffix.lower() in NO_TABLES:
-        text = (
-            f"this is {path.suffix[1:].upper().replace('YML', 'YAML')}, not a table; give a CSV"
-            " file that begins"
-        )
-        raise refused(file, f"{text} with a line such as {EXAMPLE}")
     lines = table_lines(path)
     if not lines:
-        raise refused(file, f"the file is empty; its first line should be {EXAMPLE}")
-    header = _Header(file, lines[0])
-    x_column, y_column, profile = header.choose(x, y)
-    wanted = [*([] if x_column is None else [x_column]), y_column, *profile]
-    if UNCERTAINTY in header.columns:
-        wanted.append(header.columns[UNCERTAINTY])
-        if wanted[-1].kind != y_column.kind:
-            text = (
-                f"the uncertainty is an {wanted[-1].kind} and {y_column.name} a {y_column.kind};"
-                " correct the unit"
-            )
-            raise refused(file, text, line=lines[0].number)
-    messages: list[Message] = []
-    values: list[list[float]] = []
-    names: list[str] = []
-    features = []
-    normals = []
-    names_seen: dict[str, int] = {}
-    decimal = decimal_sign(lines[1:], [header.index(column) for column in wanted])
-    for line in lines[1:]:
-        number = line.number
-        if len(messages) >= MOST_MESSAGES or len(values) > MOST_POINTS:
-            break
-        mark = Mark(file, number, 1)
-        cells = line.cells()
-        if cells is None or len(cells) != len(header.order):
-            messages.append(mark.message("", wrong_count(line, cells, len(header.order))))
-            continue
-        row = []
-        for column in wanted:
-            start, cell = cells[header.index(column)]
-            place, factor = Mark(file, number, start), header.factors[column.name]
-            row.append(
-                read_number(cell, column.name, factor, place, messages, column.kind, decimal)
-            )
-            if column.name == UNCERTAINTY and row[-1] <= 0:
-                text = f'"{cell}" is not a standard uncertainty; give one above zero'
-                messages.append(place.message("", text))
-        values.append(row)
-        if header.has_normals:
-            try:
-                normals.append(_direction([cells[header.texts[part]][1] for part in NORMALS]))
-            except QuantityError as error:
-                messages.append(
-                    Mark(file, number, cells[header.texts[NORMALS[0]]][0]).message("", str(error))
-                )
-        name = cells[header.texts[POINT]][1] if POINT in header.texts else str(len(names) + 1)
-        if name in names_seen:
-            messages.append(
-                mark.message(
-                    "",
-                    f'a second point "{shorten(name)}", as in line {names_seen[name]}; rename one',
-                )
-            )
-        names_seen[name] = number
-        names.append(name)
-        features.append(cells[header.texts[FEATURE]][1] if FEATURE in header.texts else "")
-    if len(messages) >= MOST_MESSAGES:
-        messages.append(Message(file, lines[0].number, 1, "", MORE_ERRORS))
-    if len(lines) == 1:
-        messages.append(
-            Message(
-                file,
-                lines[0].number,
-                1,
-                "",
-                "no rows below the names of the columns; add at least one",
-            )
-        )
-    if len(values) > MOST_POINTS or len(lines) > MOST_ROWS:
-        messages.append(
-            Message(file, lines[0].number, 1, "", f"more than {MOST_POINTS} points; leave some out")
-        )
-    if messages:
-        raise ExperimentError(messages)
-    table = np.array(values)
-    by_name = {column.name: table[:, k] for k, column in enumerate(wanted)}
+        raise refused(path, f"the file is empty; its first line should be {EXAMPLE}")
+    cells = list(header_cells(str(path), lines[0], EXAMPLE))
+    columns = [name for _, _, name, unit in cells if unit in LENGTH_UNITS]
+    texts = [text for text in TEXTS if text in [cell for _, cell, _, _ in cells]]
+    try:
+        x_name, y_name = _chosen_columns(columns, x, y)
+    except ValueError as error:
+        raise refused(path, str(error), line=lines[0].number) from None
+    profile = PROFILE if set(PROFILE) <= set(columns) else ()
+    wanted = list(dict.fromkeys([y_name, *profile, *([] if x_name is None else [x_name])]))
+    others = [name for name in dict.fromkeys(columns) if name not in wanted]
+    rows = read_table(path, texts, wanted, others, empty=others)
+    if len(rows) > MOST_POINTS:
+        raise refused(path, f"more than {MOST_POINTS} points; leave some out")
+    labels = [dict(zip(texts, row.texts, strict=True)) for row in rows]
+    names = [label.get("point", str(k)) for k, label in enumerate(labels, start=1)]
+    seen: set[str] = set()
+    for row, name in zip(rows, names, strict=True):
+        if name in seen:
+            raise row.mark.refused(f'a second point "{name}"; rename one')
+        seen.add(name)
+    table = np.array([row.lengths for row in rows])
+    by_name = dict(zip([*wanted, *others], table.T, strict=True))
     return CurvePoints(
         tuple(names),
-        tuple(features),
-        x_column or Column(ARC_LENGTH, profile[0].unit, profile[0].factor, "length"),
-        y_column,
-        None if x_column is None else by_name[x_column.name],
-        by_name[y_column.name],
-        by_name.get(UNCERTAINTY),
-        np.stack([by_name[column.name] for column in profile], axis=1) if profile else None,
-        np.array(normals) if header.has_normals else None,
+        tuple(label.get("feature", "") for label in labels),
+        x_name or ARC_LENGTH,
+        y_name,
+        None if x_name is None else by_name[x_name],
+        by_name[y_name],
+        np.stack([by_name[name] for name in profile], axis=1) if profile else None,
     )
 
 
-def _direction(cells: Sequence[str]) -> list[float]:
-    """A unit vector from the texts of its parts.
+def _chosen_columns(columns: Sequence[str], x: str | None, y: str | None) -> tuple[str | None, str]:
+    """Names of abscissa, None for the arc length, and error among columns of lengths.
 
-    :raises QuantityError: no numbers, or both zero.
+    :raises ValueError: there is none, or no only one.
     """
-    parts = [float(exact_number(cell.replace(",", "."))) for cell in cells]
-    length = math.hypot(*parts)
-    if not 0 < length < math.inf:
-        raise QuantityError(
-            f'"{cells[0]}" and "{cells[1]}" are not a direction; give its components, such as'
-            " 0.6 and 0.8"
-        )
-    return [part / length for part in parts]
+    has_profile = set(PROFILE) <= set(columns)
+    left = [name for name in columns if not (has_profile and name in PROFILE)]
+    x_name = None
+    if x == ARC_LENGTH and x not in columns:
+        if not has_profile:
+            text = "the arc length needs a profile; add the columns nominal_x_mm and nominal_z_mm"
+            raise ValueError(text)
+    elif x is not None:
+        x_name = _named("x", x, columns)
+    elif not has_profile and left:
+        x_name = left[0]
+    left = [name for name in left if name != x_name]
+    if y is None and len(left) > 1:
+        text = f"several columns may be the error: {listing(left)}; choose one with --y"
+        raise ValueError(text)
+    y_name = _named("y", y, columns) if y is not None else left[0] if left else None
+    if y_name is None or y_name == x_name:
+        text = "abscissa and error are two columns whose names end in a unit of length"
+        raise ValueError(f"{text}; write for example {EXAMPLE}")
+    return x_name, y_name
+
+
+def _named(option: str, name: str, columns: Sequence[str]) -> str:
+    plain = name if name in columns else name.rpartition("_")[0]
+    if plain not in columns:
+        text = f'no column "{name}" with a unit of length for --{option}; {hint(name, columns)}'
+        raise ValueError(text)
+    return plain
 
 
 def choose_points(points: CurvePoints, text: str, file: str) -> list[int]:
@@ -227,145 +145,14 @@ def choose_points(points: CurvePoints, text: str, file: str) -> list[int]:
 
     :raises ExperimentError: names that the file does not have.
     """
-    by_name = {name: k for k, name in enumerate(points.names)}
-    numbers = {int(name): k for name, k in by_name.items() if re.fullmatch("[0-9]{1,9}", name)}
     indices = set()
-    messages = []
-    for part in re.split(r"\s*,\s*", text.strip()):
-        span = re.fullmatch(r"([0-9]{1,9})\s*-\s*([0-9]{1,9})", part)
-        if part in by_name:
-            indices.add(by_name[part])
-        elif span and numbers and (int(span[1]) < min(numbers) or int(span[2]) > max(numbers)):
-            text = (
-                f'"{shorten(part)}" goes beyond the points, {min(numbers)} to {max(numbers)}; leave'
-                " those out"
-            )
-            messages.append(Message(file, 0, 0, "", text))
-        elif span and any(int(span[1]) <= number <= int(span[2]) for number in numbers):
-            indices |= {
-                k for number, k in numbers.items() if int(span[1]) <= number <= int(span[2])
-            }
-        else:
-            noun = "no points" if span else "no point"
-            messages.append(
-                Message(file, 0, 0, "", f'{noun} "{shorten(part)}"; {hint(part, points.names)}')
-            )
-    if messages:
-        raise ExperimentError(messages)
+    for part in (part.strip() for part in text.split(",")):
+        first, _, last = (name.strip() for name in part.partition("-"))
+        ends = [part] if part in points.names else [first, last]
+        unknown = [name for name in ends if name not in points.names]
+        if unknown:
+            name = unknown[0] if "-" in part and all(ends) else part
+            raise refused(file, f'no point "{name}"; {hint(name, points.names)}')
+        start, end = points.names.index(ends[0]), points.names.index(ends[-1])
+        indices |= {*range(start, end + 1)}
     return sorted(indices)
-
-
-class _Header:
-    """The first line: columns with a unit by their names, and where texts are."""
-
-    def __init__(self, file: str, line: TableLine) -> None:
-        self.mark = mark = Mark(file, line.number, 1)
-        cells = list(header_cells(file, line, EXAMPLE))
-        self.order = [cell for _, cell, _, _ in cells]
-        self.columns: dict[str, Column] = {}
-        self.factors: dict[str, Fraction] = {}
-        self.texts: dict[str, int] = {}
-        self._index: dict[str, int] = {}
-        messages = []
-        for k, (place, cell, name, unit) in enumerate(cells):
-            kind: Literal["length", "angle"] = "length" if unit in LENGTH_UNITS else "angle"
-            units: Mapping[str, Fraction] = LENGTH_UNITS if kind == "length" else ANGLE_UNITS
-            if name in self.columns or cell in self.texts:
-                messages.append(place.message("", f'a second column "{shorten(cell)}"; remove one'))
-            elif cell in (POINT, FEATURE, *NORMALS):
-                self.texts[cell] = k
-            elif name and unit in units:
-                self.columns[name] = Column(name, unit, float(units[unit]), kind)
-                self.factors[name], self._index[name] = units[unit], k
-        self.has_normals = all(part in self.texts for part in NORMALS)
-        if any(part in self.texts for part in NORMALS) and not self.has_normals:
-            messages.append(
-                mark.message("", "a normal has two parts; add the other of normal_x and normal_z")
-            )
-        if messages:
-            raise ExperimentError(messages)
-
-    def index(self, column: Column) -> int:
-        """Where a column stands."""
-        return self._index[column.name]
-
-    def choose(
-        self, x: str | None, y: str | None
-    ) -> tuple[Column | None, Column, tuple[Column, ...]]:
-        """The abscissa, None for the arc length, the error, and the profile's two columns where
-        there are.
-        """
-        profile: tuple[Column, ...] = ()
-        for names in PROFILES:
-            if all(name in self.columns and self.columns[name].kind == "length" for name in names):
-                profile = tuple(self.columns[name] for name in names)
-                break
-        columns_left = [
-            column
-            for column in self.columns.values()
-            if column not in profile and column.name != UNCERTAINTY
-        ]
-        messages: list[Message] = []
-        x_column = None
-        if x is not None and not (x == ARC_LENGTH and ARC_LENGTH not in self.columns):
-            x_column = self._named("x", x, messages)
-        elif x is not None and not profile:
-            text = "the arc length needs a profile; add the columns nominal_x_mm and nominal_z_mm"
-            messages.append(self.mark.message("", text))
-        elif not profile and len(columns_left) > 1:
-            x_column = columns_left[0]
-        columns_left = [column for column in columns_left if column is not x_column]
-        y_column = None
-        if y is not None:
-            y_column = self._named("y", y, messages)
-        elif len(columns_left) == 1:
-            y_column = columns_left[0]
-        elif columns_left:
-            text = (
-                f"several columns may be the error: {listing(c.name for c in columns_left)};"
-                " choose one"
-                " with --y"
-            )
-            messages.append(self.mark.message("", text))
-        else:
-            text = f"no column is left for the error; its name needs a unit, as in {EXAMPLE}"
-            messages.append(self.mark.message("", text))
-        if not profile and x_column is None and not messages:
-            assert y_column is not None
-            bare = [
-                name
-                for name in self.order
-                if name not in self.texts and name.rpartition("_")[0] != y_column.name
-            ]
-            lack = (
-                f"; {listing(bare)} has no unit, and columns without are not read" if bare else ""
-            )
-            text = f"there is an error but no abscissa{lack}; write for example {EXAMPLE}"
-            messages.append(self.mark.message("", text))
-        if x_column is not None and x_column is y_column:
-            messages.append(
-                self.mark.message(
-                    "", f"{x_column.name} is chosen for x and for y; choose another for one"
-                )
-            )
-        if messages:
-            raise ExperimentError(messages)
-        assert y_column is not None
-        return x_column, y_column, profile
-
-    def _named(self, option: str, name: str, messages: list[Message]) -> Column | None:
-        plain = name if name in self.columns else name.rpartition("_")[0]
-        if plain not in self.columns:
-            advice = hint(name, self.columns)
-            unit = (
-                f'the column "{shorten(name)}" has no unit of length or angle; add it, as in'
-                f" {shorten(name)}_um"
-            )
-            text = (
-                unit
-                if name in self.order
-                else f'no column "{shorten(name)}" for --{option}; {advice}'
-            )
-            messages.append(self.mark.message("", text))
-            return None
-        return self.columns[plain]

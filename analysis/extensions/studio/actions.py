@@ -11,14 +11,18 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from ballplate.extensions.repair.changes import scale_readings, with_position
+from ballplate.extensions.repair.changes import (
+    free_name,
+    middle_of,
+    scale_readings,
+    with_added,
+    with_position,
+)
 from ballplate.extensions.repair.mending import (
     changes_of,
     with_experiment,
     with_text_changes,
 )
-from ballplate.extensions.repair.placing import middle_of
-from ballplate.extensions.repair.positions import free_name, with_added
 from ballplate.extensions.repair.written import Edit, edits
 from ballplate.extensions.repair.yamltext import TextChange
 from ballplate.simulator.computing import comparable

@@ -9,17 +9,10 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from ballplate.extensions.maps.length_map import length_map, length_settings
+from ballplate.extensions.maps.length_map import length_map
 from ballplate.extensions.pages.level_maps import MISSED
-from ballplate.extensions.pages.motions import (
-    moved_balls,
-    moved_points,
-    null_motions,
-    weak_motions,
-)
 from ballplate.extensions.pages.page_facts import target_in_words
 from ballplate.extensions.repair.written import plane_of
-from ballplate.extensions.sweeps.error_map_uncertainty import LEVELS, in_slices, point_map
 from ballplate.planning import run_sheet
 from ballplate.presentation import Data, percent, picked, uncertainty_words
 from ballplate.rank import Verdict, verdict
@@ -31,14 +24,14 @@ from ballplate.simulator.geometry import ball_coordinates, even_grid, without_ri
 from ballplate.simulator.inputs import Target
 from ballplate.uncertainty import Quantity, uncertainties
 
+from .level_slices import LEVELS, in_slices, point_map
+from .motions import moved_balls, moved_points, null_motions, weak_motions
+
 # Nodes of the lattice along each axis: edges of it that bend are drawn as curves.
 NODES = 9
 
 # Nodes of the map of points along each axis, and of that of lengths, which has all lengths between.
 MAP_NODES, LENGTH_NODES = 11, 9
-
-# What lengths are compared with where the file states no target; the map shows them in metres.
-NO_TARGET = "1 um"
 
 
 @single_threaded
@@ -61,7 +54,6 @@ def summary(experiment: Experiment, moving: bool = False) -> dict[str, Any]:
             "expected": expected,
             "parameters": design.parameter_count,
             "observations": design.observation_count,
-            "reasons": [] if judged is None else judged.reasons,
             "directions": [] if judged is None else _directions(judged),
         },
         "quantities": rows(quantities),
@@ -123,8 +115,8 @@ def rows(quantities: Mapping[str, Quantity]) -> list[Data]:
 
 
 def hours_of(experiment: Experiment) -> Data:
-    """Return the `hours` that the positions of an experiment, read for planning, take in the order
-    of least change-over, and whether their times are `usual` ones, as the file states none.
+    """Return the `hours` that the positions of an experiment, read for planning, take in a short
+    order, and whether their times are `usual` ones, as the file states none.
     """
     planned = experiment if experiment.pool else experiment.with_({"pool": {}})
     assert planned.pool is not None
@@ -206,28 +198,24 @@ def _length_map(experiment: Experiment, linearisation: Linearisation) -> Data:
     largest uncertainty in metres without one; None if one of them is undetermined.
     """
     counts = (LENGTH_NODES, LENGTH_NODES, len(LEVELS))[: experiment.dimension]
-    target = target_in_words(experiment)
-    settings = length_settings(experiment, target or NO_TARGET, counts)
-    lengths = length_map(experiment, settings, at=linearisation)
-    groups = lengths.by_point
-    values = groups.missed if target else groups.maximum
-    values = np.where(groups.undetermined > 0, np.nan, values)
+    lengths = length_map(experiment, counts, at=linearisation)
+    has_target = experiment.target_uncertainty is not None
+    values = lengths.missed if has_target else lengths.maximum
+    values = np.where(lengths.undetermined > 0, np.nan, values)
     of_levels = values.reshape(LENGTH_NODES, LENGTH_NODES, -1).T
-    ratios = settings.target_factor * groups.maximum_ratio
     scale = {
-        "unit": "missed" if target else "m",
+        "unit": "missed" if has_target else "m",
         "bounds": MISSED,
-        "largest": float(np.nanmax(ratios, initial=0.0)),
+        "largest": float(np.nanmax(lengths.maximum_ratio, initial=0.0)),
     }
-    mapped = in_slices(linearisation.design, of_levels)
-    return {**picked(mapped, "x", "y", "slices"), "scale": scale}
+    return {**in_slices(linearisation.design, of_levels), "scale": scale}
 
 
 def _point_map(experiment: Experiment, linearisation: Linearisation) -> Data:
     """Return standard uncertainties of corrected points through the volume, None if
     undetermined.
     """
-    return picked(point_map(linearisation, MAP_NODES), "x", "y", "slices")
+    return point_map(linearisation, MAP_NODES)
 
 
 MAPS: Mapping[Any, Callable[[Experiment, Linearisation], Data]] = {

@@ -7,7 +7,7 @@ from math import ceil, floor
 from typing import Any
 
 import numpy as np
-from ballplate.extensions.repair.positions import PLANES, probes_across
+from ballplate.extensions.repair.candidates import PLANES, probes_across
 from ballplate.extensions.repair.yamltext import TextChange
 from ballplate.presentation import Data
 from ballplate.simulator.experiment import Experiment, Position

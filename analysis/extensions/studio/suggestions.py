@@ -9,10 +9,10 @@ from contextlib import suppress
 from typing import Any
 
 import numpy as np
-from ballplate.extensions.repair.changes import ChangeKind, apply_all, scale_readings
-from ballplate.extensions.repair.offers import offers
-from ballplate.extensions.repair.repair_search import Repair, repairs
-from ballplate.extensions.repair.repair_tables import caveat, changes_in_words
+from ballplate.extensions.repair.candidates import new_positions, pool_additions
+from ballplate.extensions.repair.changes import changed, scale_readings
+from ballplate.extensions.repair.repair_search import repairs
+from ballplate.extensions.repair.repairs import Repair
 from ballplate.extensions.repair.written import Edit, position_settings
 from ballplate.presentation import Data, picked
 from ballplate.results import given_words, planned_uncertainty, predict
@@ -37,22 +37,21 @@ def suggested_repairs(
     :raises ExperimentError: the text is invalid.
     """
     experiment = evaluable_of(document, planning=True)
-    found = repairs(experiment, report=report)
-    return [_repair_data(experiment, repair) for repair in (found.complete if found else ())]
+    found = repairs(experiment, report).repairs
+    return [_repair_data(experiment, repair) for repair in found if not repair.deficiency]
 
 
 def _repair_data(experiment: Experiment, repair: Repair) -> Data:
-    after = apply_all(repair.changes, experiment)
+    after = changed(experiment, repair.changes)
     before = {position.name: position for position in experiment.positions}
     places = [position for position in after.positions if before.get(position.name) is not position]
-    lengths = None if repair.prediction is None else repair.prediction.lengths
+    lengths = repair.prediction.lengths
     # The repaired file is one of full rank, whatever it expected.
     expectation = [Edit(("expected_rank_deficiency",), 0)] * bool(
         experiment.expected_rank_deficiency
     )
     return {
-        "words": changes_in_words(repair) + caveat(repair),
-        "faint": repair.is_faint,
+        "words": repair.words + given_words(repair.prediction.qualifications),
         "weak": repair.weak,
         "average": lengths and lengths.average,
         "maximum": lengths and lengths.maximum,
@@ -75,39 +74,33 @@ def next_positions(
     :raises ExperimentError: the text is invalid.
     """
     experiment = evaluable_of(document, planning=True)
-    offered = offers(experiment)
-    changes = [
-        change
-        for kind in (ChangeKind.POOL, ChangeKind.ADD_POSITION)
-        for change in offered.get(kind, ())
-        if isinstance(change.adds, Position)
-    ]
+    generate = new_positions if experiment.pool is None else pool_additions
+    changes = [each for each in generate(experiment) if isinstance(each.item, Position)]
     candidates = []
     for change in counted(changes, "positions", len(changes), report):
         with suppress(ExperimentError):
-            planned = planned_uncertainty(change.apply(experiment))
+            planned = planned_uncertainty(changed(experiment, [change]))
             if lengths := planned.quantities.get("U6"):
                 order = planned.deficiency, np.nan_to_num(lengths.average, nan=np.inf)
                 candidates.append((order, change, lengths))
     candidates.sort(key=lambda candidate: candidate[0])
     best: dict[object, tuple[Any, ...]] = {}
     for candidate in candidates:
-        position = candidate[1].adds
-        if isinstance(position, Position):
+        if isinstance(position := candidate[1].item, Position):
             best.setdefault(_kind(experiment, position), candidate)
     before = hours_of(experiment)["hours"]
     shown = []
     for order, change, lengths in list(best.values())[:MOST_SHOWN]:
-        settings = position_settings(experiment, change.adds)
+        settings = position_settings(experiment, change.item)
         added = done(document, {"do": "add", "settings": settings})
         after = evaluable_of(added, planning=True)
-        given = given_words(predict(change.apply(experiment)).qualifications)
+        given = given_words(predict(changed(experiment, [change])).qualifications)
         row = {
             "words": (change.words.partition(" again ")[2] or change.words) + given,
             "deficiency": order[0],
             **picked(lengths, "average", "maximum"),
             "minutes": 60.0 * (hours_of(after)["hours"] - before),
-            "place": place_data(experiment, change.adds),
+            "place": place_data(experiment, change.item),
             "settings": settings,
         }
         shown.append(row)

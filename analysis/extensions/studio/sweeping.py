@@ -16,7 +16,7 @@ from ballplate.extensions.sweeps.bundle import Bundle, names_of, unpack
 from ballplate.extensions.sweeps.load import load_sweep
 from ballplate.extensions.sweeps.running import computed
 from ballplate.presentation import finite
-from ballplate.simulator.computing import Report, unreported
+from ballplate.simulator.computing import Report
 from ballplate.simulator.experiment import named_in, node_at, node_of
 from ballplate.simulator.inputs import ExperimentError, Mark, Scalar
 
@@ -49,10 +49,7 @@ def swept(document: DesignDocument, settings: Mapping[str, Any], report: Report)
             raise ActionError("; ".join(message.text for message in error.messages)) from None
         store = file.with_suffix(".sqlite")
         result = computed(sweep, store, report=report)
-        # Imported late: it loads slowly, and few sessions sweep.
-        from ballplate.extensions.sweeps.report import sweep_page
-
-        page = sweep_page.sweep_page(store, None, document.trust.modules, None, unreported)
+        page = result.page_text()
     return {
         "headline": result.headline(),
         "axes": [list(paths) for paths in axes],

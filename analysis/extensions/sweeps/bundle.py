@@ -1,4 +1,4 @@
-"""Files of a sweep, so that any machine can compute its cells and a store can detect changes."""
+"""Files of a sweep, so that any machine can compute its cells and changes are detected."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ballplate.simulator.inputs import read_tree, refused, to_list, to_python
 from .model import Sweep
 from .named_files import named_files
 
-# All files together, which the store keeps and workers receive.
+# All files together, which workers receive.
 MOST_BYTES = 100_000_000
 
 
@@ -57,7 +57,7 @@ def bundle_of(sweep: Sweep) -> Bundle:
         if size > MOST_BYTES:
             text = (
                 f"the files of the sweep have {size / 1e6:.0f} MB; {MOST_BYTES / 1e6:.0f} MB are"
-                " the limit of a store; name large files from the root of the file system"
+                " the limit of a sweep; name large files from the root of the file system"
             )
             raise refused(sweep.source, text)
         files = tuple((name, Path(path).read_bytes()) for path, name in names.items())

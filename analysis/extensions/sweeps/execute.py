@@ -10,7 +10,6 @@ from operator import add
 from ballplate.montecarlo import Accumulator
 from ballplate.simulator.computing import ProgressStep, Report, unreported
 
-from .fingerprint import METHOD, method_of
 from .model import Sweep
 from .store import Store, add_keys, add_rows, block_tally, keys, statuses
 from .task import KEY_ONLY, CellResult, CellTask, blocks_of
@@ -82,11 +81,9 @@ def run_sweep(
 
     :raises StoreError: the store cannot be written.
     """
-    current = {cell: key for cell, key in keys(store, number).items() if method_of(key) == METHOD}
-    run = _Run(store, len(sweep.cells), current, statuses(store))
+    run = _Run(store, len(sweep.cells), keys(store, number), statuses(store))
     if {key for key, _ in run.statuses} - set(run.keys.values()):
-        # Another sweep of this store may have computed a cell already. All keys of another method
-        # are replaced before the first cell is computed, so that the store never mixes methods.
+        # Another sweep of this store may have computed a cell already.
         unknown = [CellTask(k, KEY_ONLY) for k in range(run.cells) if k not in run.keys]
         fresh = {row.number: row.key for row in runner(unknown)}
         add_keys(store, number, fresh)

@@ -9,11 +9,10 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 from ballplate.simulator.computing import Report, unreported
 from ballplate.simulator.inputs import (
-    ensure_one_of,
     ensure_path,
     ensure_report,
     ensure_type,
@@ -21,11 +20,9 @@ from ballplate.simulator.inputs import (
 )
 
 if TYPE_CHECKING:
-    from .running import SweepResult
+    from .result import SweepResult
 
 PathLike = str | os.PathLike[str]
-
-FORMS = ("html", "text", "markdown", "csv", "latex")
 
 
 def sweep(
@@ -69,7 +66,7 @@ def stored(store: PathLike, sweep: int | None = None) -> SweepResult:
     """Return a sweep of a store, the newest unless its number is given, with the cells computed so
     far.
 
-    Of a damaged store, unreadable cells are missing; the result's `remarks` list them.
+    :raises StoreError: the store cannot be used, or is damaged.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -87,55 +84,3 @@ def stored(store: PathLike, sweep: int | None = None) -> SweepResult:
     ensure_whole(1, sweep=sweep)
     with closing(open_store(Path(store))) as opened:
         return stored_result(opened, sweep)
-
-
-def sweep_report(
-    store: PathLike,
-    sweep: int | None = None,
-    form: Literal["html", "text", "markdown", "csv", "latex"] = "html",
-    run_modules: bool = False,
-    report: Report = unreported,
-    compare: PathLike | None = None,
-) -> str:
-    r"""Return a sweep of a store as an HTML page, or its tables in another form.
-
-    Designs with error models in Python are drawn only with `run_modules`. A page can `compare` the
-    sweep with the newest one of another store.
-
-    :raises ValueError: the two sweeps cannot be compared.
-
-    >>> import tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     path = f"{folder}/plates.sqlite"
-    ...     computed = sweep("designs/sweeps/plate-size.yaml", path)
-    ...     print(*sweep_report(path, form="markdown").splitlines()[:3], sep="\n")
-    # size of the plate and number of its balls
-    <BLANKLINE>
-    ## Standard uncertainties
-    """
-    ensure_path("store", store)
-    ensure_whole(1, sweep=sweep)
-    ensure_one_of(FORMS, form=form)
-    if compare is not None:
-        ensure_path("compare", compare)
-        if form != "html":
-            raise ValueError("compare applies to pages only; leave it out")
-    ensure_type(bool, "True or False", run_modules=run_modules)
-    ensure_report(report)
-    if form == "html":
-        # Tables need neither pages nor their libraries.
-        from .report.sweep_page import sweep_page
-
-        reference = None if compare is None else Path(compare)
-        return sweep_page(Path(store), sweep, run_modules, reference, report)
-    from contextlib import closing
-
-    from ballplate.presentation import FORMATS
-
-    from .report.results import read_results
-    from .report.tables import text_tables
-    from .store import open_store
-
-    with closing(open_store(Path(store))) as opened:
-        results = read_results(opened, sweep)
-        return FORMATS[form](results.title, text_tables(results))

@@ -18,7 +18,6 @@ from ballplate.simulator.experiment import (
     override,
     python_models,
     variant_trees,
-    with_present_keys,
 )
 from ballplate.simulator.inputs import (
     OPENED,
@@ -50,11 +49,10 @@ MOST_CELLS = 1_000_000
 
 def load_sweep(
     path: str | os.PathLike[str],
-    base: Path | None = None,
     folders: tuple[Path, ...] = (),
     trust: Trust = OPENED,
 ) -> Sweep:
-    """Load a sweep file and the experiment file that it starts from, or `base` instead.
+    """Load a sweep file and the experiment file that it starts from.
 
     Files that it names must be below its folder, that of its base, or one of `folders`.
 
@@ -71,7 +69,7 @@ def load_sweep(
     settings = _settings(root, problems)
     if settings is None:
         raise ExperimentError(sorted(problems.messages))
-    base = source.parent / settings.base if base is None else base
+    base = source.parent / settings.base
     try:
         trees = _trees(base)
     except ExperimentError as error:
@@ -191,7 +189,7 @@ def _trees(base: Path) -> Trees:
 
     :raises ExperimentError: the file cannot be read, or a variant is invalid.
     """
-    root = with_present_keys(read_tree(base))
+    root = read_tree(base)
     problems = Problems(root)
     variants = variant_trees(root, problems)
     if problems.messages:

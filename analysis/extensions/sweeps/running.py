@@ -2,46 +2,41 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from ballplate.presentation import Data, Result, picked
 from ballplate.simulator.computing import Report, unreported
 from ballplate.simulator.inputs import UnusableError, in_one_line
 from filelock import FileLock, Timeout
 
+from .answer import answer
 from .bundle import Bundle, bundle_of, changes, definition
 from .execute import Runner, Summary, run_sweep
 from .frame import frame_of
 from .local import local_runner
 from .model import Sweep
+from .result import SweepResult
 from .store import (
     Store,
+    add_details,
     add_sweep,
     chosen_sweep,
-    damaged_cells,
     definitions,
+    details_of,
     ensure_in_place,
-    of_other_methods,
+    keys,
     open_store,
     results,
     statuses,
 )
 from .store_file import StoreError, check_place
 from .stored import StoredRow
-
-if TYPE_CHECKING:
-    import pandas
+from .task import GIVEN_ONLY, CellTask
 
 # Changes between two sweeps that are listed.
 MOST_CHANGES = 20
-
-# Columns of a printed table; the data frame has all.
-AVERAGE = re.compile(r"U\d+(_lengths)?_average_\w+")
 
 # Reasons of failures that are listed.
 MOST_REASONS = 10
@@ -51,87 +46,12 @@ class OtherSweepError(UnusableError):
     """The store holds another sweep; the text lists the differences, one per row."""
 
 
-@dataclass(frozen=True)
-class Entered:
-    """A sweep in its store: its number, whether there are others, notes on unusable rows."""
-
-    number: int
-    has_others: bool
-    remarks: tuple[str, ...]
-
-
-@dataclass(frozen=True, repr=False)
-class SweepResult(Result):
-    """A sweep as computed so far: a row of the store for each cell.
-
-    `remarks` are notes on stored rows that could not be used; `shortcomings` are reasons of failed
-    cells and differences of versions. `number` is the sweep's in its store.
-    """
-
-    label: str
-    title: str
-    store: Path
-    summary: Summary
-    table: pandas.DataFrame
-    number: int
-    remarks: tuple[str, ...] = ()
-    shortcomings: tuple[str, ...] = ()
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        return self.shortcomings
-
-    def page_text(self, run_modules: bool, compare: str | Path | None, report: Report) -> str:
-        """Return the sweep's page, compared with the newest sweep of another store if given."""
-        from .report.sweep_page import sweep_page
-
-        reference = None if compare is None else Path(compare)
-        return sweep_page(self.store, self.number, run_modules, reference, report)
-
-    def headline(self) -> str:
-        summary = self.summary
-        remaining = f", {summary.left} left" if summary.left else ""
-        return f"{summary.cells} cases, {summary.done} done, {summary.failed} failed{remaining}"
-
-    def lines(self) -> list[str]:
-        names = list(self.table.columns)
-        averages = [name for name in names if AVERAGE.fullmatch(name)]
-        axes = names[: names.index("status") + 1]
-        rank = [name for name in ("rank_deficiency",) if name in names]
-        shown = [*axes, *rank, *averages, "given"]
-        table = self.table[shown].to_string(index=False).splitlines()
-        return [self.heading, self.headline(), *self.remarks, "", *table]
-
-    def data(self) -> Data:
-        return {
-            "sweep": self.label,
-            "title": self.title,
-            "store": str(self.store),
-            **picked(self.summary, "cells", "done", "failed", "left"),
-            "shortcomings": self.shortcomings,
-            "rows": self.rows(),
-        }
-
-    def rows(self) -> list[Data]:
-        """Return one mapping per cell, with its axes' values and its results; None for missing
-        ones.
-        """
-        table = self.table.astype(object)
-        return [
-            {str(k): v for k, v in row.items()}
-            for row in table.where(table.notna(), None).to_dict("records")
-        ]
-
-    def to_frame(self) -> pandas.DataFrame:
-        return self.table
-
-
 @contextmanager
 def writable_store(path: Path) -> Iterator[Store]:
     """Open the store at a path for this process alone; a missing store is made.
 
-    :raises StoreError: no store, one that cannot be written, or one that another process has
-        opened.
+    :raises StoreError: no store, a damaged one, one that cannot be written, or one that another
+        process has opened.
     """
     check_place(path, create=True)
     try:
@@ -147,8 +67,9 @@ def writable_store(path: Path) -> Iterator[Store]:
         ) from None
 
 
-def enter(store: Store, sweep: Sweep, bundle: Bundle, beside: bool) -> Entered:
-    """Find a sweep in its store, or enter it; with `beside`, in addition to others.
+def enter(store: Store, sweep: Sweep, bundle: Bundle, beside: bool) -> int:
+    """Find a sweep in its store, or enter it; with `beside`, in addition to others. Return its
+    number.
 
     :raises OtherSweepError: the store holds another one with results.
     :raises StoreError: the store cannot be read.
@@ -164,34 +85,39 @@ def enter(store: Store, sweep: Sweep, bundle: Bundle, beside: bool) -> Entered:
         first = in_one_line(f"{store.path}: holds another sweep; what has changed:")
         last = "name another store with --store, or add the sweep to this one with --beside"
         raise OtherSweepError("\n".join([first, *differences, last]))
-    if number is None:
-        number = add_sweep(store, new, bundle.files)
-    rows = results(store, number, len(sweep.cells))
-    remarks = [damaged_cells(store.path, rows, "replaced in this run")]
-    for text in of_other_methods(rows.keys):
-        remarks.append(in_one_line(f"{store.path}: {text}; replaced in this run"))
-    has_others = len({*stored, number}) > 1
-    return Entered(number, has_others, tuple(filter(None, remarks)))
+    return add_sweep(store, new) if number is None else number
 
 
 def compute_sweep(
     store: Store,
     sweep: Sweep,
-    entered: Entered,
+    number: int,
     runner: AbstractContextManager[Runner],
     retry_failed: bool = False,
     fail_fast: bool = False,
     report: Report = unreported,
 ) -> Summary:
-    """Compute the remaining cells of a sweep that is entered.
+    """Compute the remaining cells of sweep `number` of a store, then what the figures of the best
+    one take for granted.
 
     :raises StoreError: the store cannot be written, or was moved.
     :raises ChangedError: files of the sweep have changed meanwhile.
     """
     with runner as working:
-        summary = run_sweep(store, entered.number, sweep, working, retry_failed, fail_fast, report)
+        summary = run_sweep(store, number, sweep, working, retry_failed, fail_fast, report)
+        found = None if summary.left else answer(stored_result(store, number))
+        if found is not None:
+            _assess(store, keys(store, number)[found.case], working, found.case)
     ensure_in_place(store)
     return summary
+
+
+def _assess(store: Store, key: str, runner: Runner, cell: int) -> None:
+    """Enter what the figures of a cell take for granted, assumptions included."""
+    if "assessed" not in details_of(store, key):
+        for row in runner([CellTask(cell, GIVEN_ONLY)]):
+            given = row.details.get("given", [f"assumptions not assessed ({row.reason})"])
+            add_details(store, key, {"given": given, "assessed": True})
 
 
 def computed(
@@ -206,15 +132,16 @@ def computed(
     """Compute a sweep into the store at a path on this machine; see `ballplate.sweep`."""
     bundle = bundle_of(sweep)
     with writable_store(path) as store:
-        entered = enter(store, sweep, bundle, beside)
+        number = enter(store, sweep, bundle, beside)
         runner = nullcontext(local_runner(sweep, bundle, workers))
-        summary = compute_sweep(store, sweep, entered, runner, retry_failed, fail_fast, report)
-        return result_of(store, sweep, entered, summary)
+        summary = compute_sweep(store, sweep, number, runner, retry_failed, fail_fast, report)
+        result = stored_result(store, number)
+    return replace(result, label=sweep.source.stem, summary=summary)
 
 
 def shortcomings(path: Path, rows: Sequence[StoredRow]) -> tuple[str, ...]:
     """Return notes on the rows of a sweep: different versions, parts of the volume that are no
-    longer spanned, and reasons of failed cells.
+    longer spanned, differences of Monte Carlo from linear theory, and reasons of failed cells.
     """
     notes = []
     versions = {tuple(row.versions.items()) for row in rows}
@@ -223,10 +150,17 @@ def shortcomings(path: Path, rows: Sequence[StoredRow]) -> tuple[str, ...]:
         notes.append(in_one_line(f"{path}: {text}"))
     reasons: dict[str, list[int]] = {}
     for row in rows:
-        of_size = row.details.get("unspanned")
-        if row.status == "failed" or of_size:
-            text = f": {of_size}" if of_size else f" failed: {row.reason}"
-            reasons.setdefault(text, []).append(row.number)
+        flags = row.details.get("flags", {}).items()
+        differences = "; ".join(f"{symbol} {', '.join(names)}" for symbol, names in flags)
+        texts = {
+            " failed: ": row.reason,
+            ": ": row.details.get("unspanned", ""),
+            ": no Monte Carlo: ": row.details.get("monte_carlo", ""),
+            ": Monte Carlo differs from linear theory: ": differences,
+        }
+        for start, text in texts.items():
+            if text:
+                reasons.setdefault(f"{start}{text}", []).append(row.number)
     for reason, cells in list(reasons.items())[:MOST_REASONS]:
         more = f" and {len(cells) - 1} more" if len(cells) > 1 else ""
         notes.append(f"case {cells[0]}{more}{reason}")
@@ -234,17 +168,6 @@ def shortcomings(path: Path, rows: Sequence[StoredRow]) -> tuple[str, ...]:
         more_reasons = len(reasons) - MOST_REASONS
         notes.append(f"and {more_reasons} reasons more; see ballplate sweep --export")
     return tuple(notes)
-
-
-def result_of(store: Store, sweep: Sweep, entered: Entered, summary: Summary) -> SweepResult:
-    """Return a sweep that has been computed, with its rows in the store."""
-    return replace(
-        stored_result(store, entered.number),
-        label=sweep.source.stem,
-        title=sweep.title,
-        summary=summary,
-        remarks=entered.remarks,
-    )
 
 
 def stored_result(store: Store, sweep: int | None = None) -> SweepResult:
@@ -257,14 +180,12 @@ def stored_result(store: Store, sweep: int | None = None) -> SweepResult:
     stored = results(store, number, cells)
     status = [row.status for row in stored.rows]
     summary = Summary(cells, len(status), status.count("done"), status.count("failed"))
-    damage = damaged_cells(store.path, stored, "not in this result")
     return SweepResult(
         Path(store.path).stem,
-        str(defined["title"]),
         Path(store.path),
+        number,
+        defined,
         summary,
         frame_of(stored, defined),
-        number,
-        (damage,) if damage else (),
         shortcomings(store.path, stored.rows),
     )

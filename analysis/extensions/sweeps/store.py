@@ -1,8 +1,7 @@
 """The store of a sweep: one SQLite file, written by one process, that survives interruptions.
 
 Every row is on disk before it is reported. A result's key is the fingerprint of the computation,
-with the replicate block. So no sweep computes a cell again that the store has, unless a later
-version uses another method.
+with the replicate block. So no sweep computes a cell again that the store has.
 """
 
 from __future__ import annotations
@@ -10,7 +9,6 @@ from __future__ import annotations
 import json
 import os
 import sqlite3
-from collections import Counter
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
@@ -19,19 +17,9 @@ from typing import Any
 
 import numpy as np
 from ballplate.montecarlo import Accumulator, QuantityAccumulator
-from ballplate.simulator.inputs import in_one_line, number_of
 
-from .fingerprint import METHOD, METHODS, method_of
 from .store_file import RECOMPUTE, StoreError, connected, store_error
-from .stored import (
-    DamagedError,
-    StoredResults,
-    check_digest,
-    digest_of,
-    plain,
-    read_results,
-    whole_results,
-)
+from .stored import DETAILS, RESULTS, StoredResults, digest_of, plain, read_results
 from .task import CellResult
 
 COLUMNS = (
@@ -59,13 +47,14 @@ class Store:
         self.connection.close()
 
 
-def open_store(path: Path, create: bool = False) -> Store:
+def open_store(path: Path, create: bool = False, damaged: bool = False) -> Store:
     """Open a store for reading or, with `create`, for writing; then a missing store is made.
 
-    :raises StoreError: no such store, a file that is no store, or a damaged one to be written to.
+    :raises StoreError: no such store, a file that is no store, or unless `damaged` is allowed a
+        damaged one.
     """
     try:
-        connection = connected(path, create)
+        connection = connected(path, create, damaged)
         status = os.stat(path)
     except sqlite3.Error as error:
         raise store_error(path, error) from None
@@ -122,28 +111,17 @@ def _reading(store: Store) -> Iterator[sqlite3.Connection]:
         raise store_error(store.path, error) from None
 
 
-def add_sweep(store: Store, definition: dict[str, Any], files: Iterable[tuple[str, bytes]]) -> int:
-    """Enter a sweep's definition and files, and return its number.
+def add_sweep(store: Store, definition: dict[str, Any]) -> int:
+    """Enter a sweep's definition, and return its number.
 
-    :raises StoreError: the store cannot be written, or the name of a file is no text.
+    :raises StoreError: the store cannot be written.
     """
-    files = tuple(files)
-    for name, _ in files:
-        if not name.isprintable():
-            raise StoreError(
-                f"{store.path}: cannot keep a file of the name {name}; give it one of printable"
-                " characters"
-            )
     with _transaction(store) as connection:
         text = json.dumps(definition, sort_keys=True)
         query = "SELECT coalesce(max(id), 0) + 1 FROM sweep"
         number = int(connection.execute(query).fetchone()[0])
         insert = "INSERT INTO sweep (id, definition, digest) VALUES (?, ?, ?)"
         connection.execute(insert, [number, text, digest_of(number, text)])
-        connection.executemany(
-            "INSERT INTO bundle (sweep, path, content, digest) VALUES (?, ?, ?, ?)",
-            [(number, name, content, digest_of(number, name, content)) for name, content in files],
-        )
     return number
 
 
@@ -155,15 +133,10 @@ def definitions(store: Store) -> dict[int, dict[str, Any]]:
     with _reading(store) as connection:
         rows = connection.execute("SELECT id, definition, digest FROM sweep ORDER BY id").fetchall()
     for number, text, digest in rows:
-        _check(store, f"the definition of sweep {number}", digest, number, text)
+        if digest != digest_of(number, text):
+            text = f"is damaged: the definition of sweep {number} has changed; {RECOMPUTE}"
+            raise StoreError(f"{store.path}: {text}")
     return {number: plain(json.loads(text)) for number, text, _ in rows}
-
-
-def _check(store: Store, name: str, digest: object, *values: object) -> None:
-    try:
-        check_digest(digest, *values)
-    except DamagedError as error:
-        raise StoreError(f"{store.path}: is damaged: {name}: {error}; {RECOMPUTE}") from None
 
 
 def chosen_sweep(store: Store, number: int | None) -> tuple[int, dict[str, Any]]:
@@ -180,43 +153,17 @@ def chosen_sweep(store: Store, number: int | None) -> tuple[int, dict[str, Any]]
     return number, defined[number]
 
 
-def files(store: Store, sweep: int) -> tuple[tuple[str, bytes], ...]:
-    """Return the files of a sweep by their path from the common folder.
-
-    :raises StoreError: they cannot be read, or are damaged.
-    """
-    query = "SELECT path, content, digest FROM bundle WHERE sweep = ? ORDER BY path"
-    with _reading(store) as connection:
-        rows = connection.execute(query, [sweep]).fetchall()
-    for name, content, digest in rows:
-        _check(store, f"the file {name} in it", digest, sweep, name, content)
-    return tuple((name, content) for name, content, _ in rows)
-
-
 def keys(store: Store, sweep: int) -> dict[int, str]:
     """Return the known keys of cells by number."""
     with _reading(store) as connection:
-        rows = connection.execute("SELECT number, key, digest FROM cell WHERE sweep = ?", [sweep])
-        return {k: key for k, key, digest in rows if digest == digest_of(sweep, k, key)}
-
-
-def of_other_methods(result_keys: Iterable[str]) -> list[str]:
-    """Return notes on rows that another method computed, judged by their keys."""
-    notes = []
-    for method, count in sorted(Counter(map(method_of, result_keys)).items()):
-        if method == METHOD:
-            continue
-        later = [text for number, text in METHODS.items() if method < number <= METHOD]
-        reason = f"before corrections to {'; '.join(later)}" if later else "of a later version"
-        rows = f"{count} row{' was' if count == 1 else 's were'} computed by method {method}"
-        notes.append(f"{rows}, {reason}; this version computes by method {METHOD}")
-    return notes
+        return dict(connection.execute("SELECT number, key FROM cell WHERE sweep = ?", [sweep]))
 
 
 def statuses(store: Store) -> dict[tuple[str, int], str]:
-    """Return the status of every sound result by key and block."""
+    """Return the status of every result by key and block."""
     with _reading(store) as connection:
-        return {(key, block): status for key, block, status in whole_results(connection)}
+        rows = connection.execute("SELECT key, block, status FROM result")
+        return {(key, block): status for key, block, status in rows}
 
 
 def add_keys(store: Store, sweep: int, cell_keys: dict[int, str]) -> None:
@@ -255,6 +202,24 @@ def add_rows(store: Store, sweep: int, rows: Iterable[CellResult]) -> None:
                 update = f"UPDATE result SET seconds = seconds + ({seconds})"
                 connection.execute(f"{update} WHERE key = ? AND block = 0", [row.key, row.key])
                 connection.execute("DELETE FROM result WHERE key = ? AND block > 0", [row.key])
+
+
+def details_of(store: Store, key: str) -> dict[str, Any]:
+    """Return the texts of a finished cell."""
+    with _reading(store) as connection:
+        query = "SELECT details FROM result WHERE key = ? AND block = 0"
+        return dict(json.loads(connection.execute(query, [key]).fetchone()[0]))
+
+
+def add_details(store: Store, key: str, more: dict[str, Any]) -> None:
+    """Enter more texts of a finished cell."""
+    text = json.dumps({**details_of(store, key), **more}, ensure_ascii=True, sort_keys=True)
+    with _transaction(store) as connection:
+        query = f"{RESULTS} WHERE key = ? AND block = 0"
+        *content, _, _ = connection.execute(query, [key]).fetchone()
+        content[DETAILS] = text
+        update = "UPDATE result SET details = ?, digest = ? WHERE key = ? AND block = 0"
+        connection.execute(update, [text, digest_of(*content), key])
 
 
 def _text(store: Store, value: str) -> int:
@@ -309,14 +274,3 @@ def results(store: Store, sweep: int, count: int) -> StoredResults:
     """
     with _reading(store) as connection:
         return read_results(connection, sweep, count)
-
-
-def damaged_cells(path: Path, results: StoredResults, consequence: str) -> str:
-    """Return a message on the unreadable cells of a store; empty without any."""
-    if not results.damaged:
-        return ""
-    cells = sorted(results.damaged)
-    more = f" and {len(cells) - 10} more" if len(cells) > 10 else ""
-    counted = number_of(len(cells), "unreadable case")
-    text = f"{', '.join(map(str, cells[:10]))}{more} ({results.damaged[cells[0]]})"
-    return in_one_line(f"{path}: {counted}: {text}; {consequence}")

@@ -12,7 +12,15 @@ from urllib.parse import quote
 
 from ballplate.simulator.inputs import UnusableError, in_one_line
 
-FORMAT = "ballplate sweep store 2"
+from .stored import damage
+
+# Its number rises whenever tables change, or any experiment gets other results.
+FORMAT = "ballplate sweep store 3"
+# A format that is read but not continued, and its further table, which is not read.
+EARLIER = "ballplate sweep store 2"
+FILES = """CREATE TABLE bundle (
+    sweep INTEGER, path TEXT, content BLOB NOT NULL, digest BLOB, PRIMARY KEY (sweep, path)
+) WITHOUT ROWID"""
 
 # Seconds to wait for another writing process.
 PATIENCE = 20.0
@@ -24,9 +32,6 @@ RECOMPUTE = "name a new file with ballplate sweep --store to recompute; this one
 TABLES = """
 CREATE TABLE about (name TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
 CREATE TABLE sweep (id INTEGER PRIMARY KEY, definition TEXT NOT NULL, digest BLOB);
-CREATE TABLE bundle (
-    sweep INTEGER, path TEXT, content BLOB NOT NULL, digest BLOB, PRIMARY KEY (sweep, path)
-) WITHOUT ROWID;
 CREATE TABLE cell (
     sweep INTEGER, number INTEGER, key TEXT NOT NULL, digest BLOB, PRIMARY KEY (sweep, number)
 ) WITHOUT ROWID;
@@ -65,14 +70,14 @@ def store_error(path: Path, error: sqlite3.Error) -> StoreError:
     return StoreError(f"{path}: {words.format(error)}")
 
 
-def connected(path: Path, create: bool) -> sqlite3.Connection:
-    """Return a connection to a store: for reading its sound tables or, with `create`, to a sound
-    store.
+def connected(path: Path, create: bool, damaged: bool) -> sqlite3.Connection:
+    """Return a connection to a store, for reading or, with `create`, for writing.
 
     With `create`, a missing store is made. Without, even a store on a full or write-protected disk
     can be read.
 
-    :raises StoreError: the file is no store and cannot become one; with `create`, a damaged one.
+    :raises StoreError: the file is no store and cannot become one or, unless `damaged` is allowed,
+        a damaged one.
     :raises sqlite3.Error: SQLite cannot open it.
     """
     check_place(path, create)
@@ -97,6 +102,8 @@ def connected(path: Path, create: bool) -> sqlite3.Connection:
             connection = _opened(f"{address}?immutable=1")
         connection.execute("PRAGMA query_only = ON")
         check_tables(path, connection)
+        if not damaged:
+            _check_soundness(path, connection)
     except BaseException:
         connection.close()
         raise
@@ -160,9 +167,9 @@ def check_place(path: Path, create: bool) -> None:
         raise StoreError(f"{path}: is no store of ballplate sweep; {MEND}")
 
 
-def check_tables(path: Path, connection: sqlite3.Connection) -> None:
-    """Refuse a database with tables other than a store's, or with views or triggers, which may run
-    code.
+def check_tables(path: Path, connection: sqlite3.Connection) -> str:
+    """Return the format of a store. Refuse a database with tables other than a store's, or with
+    views or triggers, which may run code.
 
     :raises StoreError: it has some.
     :raises sqlite3.Error: SQLite cannot read it.
@@ -173,28 +180,30 @@ def check_tables(path: Path, connection: sqlite3.Connection) -> None:
     if any(text.startswith("CREATE TABLE about ") for text in statements):
         row = connection.execute("SELECT value FROM about WHERE name = 'format'").fetchone()
         stored_format = str(row[0]) if row else ""
-    if stored_format != FORMAT and stored_format.startswith(FORMAT[:-1]):
+    if stored_format not in (FORMAT, EARLIER) and stored_format.startswith(FORMAT[:-1]):
         number = stored_format[len(FORMAT) - 1 :]
         text = f"was made by another version of ballplate (format {number}); use that version"
         raise StoreError(f"{path}: {text}, or {RECOMPUTE}")
-    if stored_format != FORMAT or statements != {text.strip() for text in TABLES.split(";")[:-1]}:
+    tables = {text.strip() for text in TABLES.split(";")[:-1]}
+    tables |= {FILES} if stored_format == EARLIER else set()
+    if stored_format not in (FORMAT, EARLIER) or statements != tables:
         raise StoreError(f"{path}: is no store of ballplate sweep but another database; {MEND}")
+    return stored_format
 
 
 def _prepare(path: Path, connection: sqlite3.Connection) -> None:
     """Make the tables of an empty store, or check those of an existing one.
 
-    :raises StoreError: it is no store, or damaged.
+    :raises StoreError: it is no store, a damaged one, or one of an earlier version.
     """
     has_tables = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
     if has_tables:
-        check_tables(path, connection)
-        fault = damage(connection)
-        if fault:
+        if check_tables(path, connection) != FORMAT:
             raise StoreError(
-                f"{path}: is damaged ({fault}); ballplate sweep --export and --report read the"
-                f" undamaged cases; {RECOMPUTE}"
+                f"{path}: was computed by an earlier version of ballplate; ballplate sweep --export"
+                f" reads it; {RECOMPUTE}"
             )
+        _check_soundness(path, connection)
     connection.execute("PRAGMA journal_mode = WAL")
     # Rows are on disk when a call returns.
     connection.execute("PRAGMA synchronous = FULL")
@@ -206,10 +215,8 @@ def _prepare(path: Path, connection: sqlite3.Connection) -> None:
         connection.execute("COMMIT")
 
 
-def damage(connection: sqlite3.Connection) -> str:
-    """Return the first fault that SQLite's integrity check finds; empty in a sound database."""
-    try:
-        (text,) = connection.execute("PRAGMA integrity_check(1)").fetchone()
-    except sqlite3.DatabaseError as error:
-        return str(error)
-    return "" if text == "ok" else str(text)[:200]
+def _check_soundness(path: Path, connection: sqlite3.Connection) -> None:
+    fault = damage(connection)
+    if fault:
+        text = "ballplate sweep --export reads the undamaged cases"
+        raise StoreError(f"{path}: is damaged ({fault}); {text}; {RECOMPUTE}")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import sqlite3
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
@@ -14,8 +13,6 @@ import numpy as np
 from ballplate.simulator.inputs import in_lines
 from ballplate.simulator.machines import Array, Integers
 
-from .store_file import damage
-
 # Results with their texts: the values of their digests, the duration and the digest.
 RESULTS = (
     "SELECT result.key, block, status, reason, seed, names.value, figures, details, versions.value,"
@@ -23,6 +20,18 @@ RESULTS = (
     " LEFT JOIN text AS names ON names.id = result.names"
     " LEFT JOIN text AS versions ON versions.id = result.versions"
 )
+
+
+# Place of the details among these values.
+DETAILS = 7
+
+# Other rows with digests.
+SIGNED = (
+    "SELECT id, definition, digest FROM sweep",
+    "SELECT sweep, number, key, digest FROM cell",
+)
+
+CHANGED = "its content has changed since it was stored"
 
 
 class DamagedError(Exception):
@@ -49,7 +58,7 @@ def check_digest(digest: object, *values: object) -> None:
     :raises DamagedError: they are not.
     """
     if digest != digest_of(*values):
-        raise DamagedError("its content has changed since it was stored")
+        raise DamagedError(CHANGED)
 
 
 def plain(value: Any) -> Any:
@@ -99,13 +108,11 @@ def whole_row(number: int, values: tuple[Any, ...]) -> StoredRow:
 class StoredResults:
     """Results of a sweep in the order of their cells, without unfinished ones.
 
-    `damaged` has the faults of unreadable cells; `file_fault` is SQLite's, if the whole file is
-    damaged.
+    `damaged` has the faults of unreadable cells.
     """
 
     rows: list[StoredRow]
     damaged: dict[int, str] = field(default_factory=dict)
-    file_fault: str = ""
 
     @property
     def cells(self) -> Integers:
@@ -153,10 +160,9 @@ def read_results(connection: sqlite3.Connection, sweep: int, count: int) -> Stor
             raise
         except (sqlite3.DatabaseError, DamagedError) as error:
             damaged[number] = str(error)
-    fault = damage(connection) if missing or damaged else ""
     # In a damaged file, the result of a missing cell may be lost.
-    damaged |= dict.fromkeys(missing, fault) if fault else {}
-    return StoredResults(rows, damaged, fault)
+    fault = file_damage(connection) if missing or damaged else ""
+    return StoredResults(rows, damaged | (dict.fromkeys(missing, fault) if fault else {}))
 
 
 def _key(connection: sqlite3.Connection, sweep: int, number: int) -> str | None:
@@ -168,11 +174,25 @@ def _key(connection: sqlite3.Connection, sweep: int, number: int) -> str | None:
     return str(values[0])
 
 
-def whole_results(connection: sqlite3.Connection) -> Iterator[tuple[str, int, str]]:
-    """Return key, block and status of every sound result.
+def damage(connection: sqlite3.Connection) -> str:
+    """Return the first fault of a store; empty in a sound one."""
+    fault = file_damage(connection)
+    if fault:
+        return fault
+    for query in SIGNED:
+        for *values, digest in connection.execute(query):
+            if digest != digest_of(*values):
+                return CHANGED
+    for *values, _, digest in connection.execute(RESULTS):
+        if digest != digest_of(*values):
+            return CHANGED
+    return ""
 
-    :raises sqlite3.Error: the store cannot be read.
-    """
-    for key, block, status, *content, _, digest in connection.execute(RESULTS):
-        if digest == digest_of(key, block, status, *content):
-            yield key, block, status
+
+def file_damage(connection: sqlite3.Connection) -> str:
+    """Return the first fault that SQLite's integrity check finds; empty in a sound database."""
+    try:
+        (text,) = connection.execute("PRAGMA integrity_check(1)").fetchone()
+    except sqlite3.DatabaseError as error:
+        return str(error)
+    return "" if text == "ok" else str(text)[:200]

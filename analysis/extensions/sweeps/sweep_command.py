@@ -60,7 +60,7 @@ def add_options(parser: ArgumentParser) -> None:
         action="append",
         default=[],
         help=(
-            "further folder whose files the sweep may name and the store copies; default: the"
+            "further folder whose files the sweep may name; default: the"
             " folders of the sweep file and of its base; may be repeated"
         ),
     )
@@ -98,9 +98,7 @@ def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
     from .local import ChangedError
     from .running import compute_sweep, enter
 
-    entered = enter(store, sweep, bundle, options.beside)
-    for remark in entered.remarks:
-        complain(remark)
+    number = enter(store, sweep, bundle, options.beside)
     options.interruption.kept = lambda: (
         f"finished cases are in {store.path}, and the same command continues from there"
     )
@@ -113,7 +111,7 @@ def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
 
             runner = _runner(sweep, bundle, options)
             summary = compute_sweep(
-                store, sweep, entered, runner, options.retry_failed, options.fail_fast, report
+                store, sweep, number, runner, options.retry_failed, options.fail_fast, report
             )
         if summary.left:
             options.interruption.answer()
@@ -124,9 +122,7 @@ def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
         )
         complain(f"{options.file}: {text}")
         return BAD_FILE
-    _report(
-        store, f" of sweep {entered.number}" if entered.has_others else "", entered.number, summary
-    )
+    _report(store, number, summary)
     return 1 if summary.failed or summary.left else 0
 
 
@@ -141,12 +137,13 @@ def _runner(sweep: Sweep, bundle: Bundle, options: Namespace) -> AbstractContext
     return nullcontext(local_runner(sweep, bundle, options.workers or processors()))
 
 
-def _report(store: Store, which: str, number: int, summary: Summary) -> None:
+def _report(store: Store, number: int, summary: Summary) -> None:
     from ballplate.simulator.inputs import in_one_line, number_of
 
     from .running import shortcomings
-    from .store import results
+    from .store import definitions, results
 
+    which = f" of sweep {number}" if len(definitions(store)) > 1 else ""
     before = f" ({summary.before} of them before)" if summary.before else ""
     remaining = f", {summary.left} left" if summary.left else ""
     counted = f"{number_of(summary.cells, 'case')}{which}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import time
 import traceback
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -19,12 +20,12 @@ from ballplate.montecarlo import (
     combined,
     trials,
 )
-from ballplate.results import Prediction, predict
+from ballplate.results import Prediction, Qualification, predict, qualifications_of
 from ballplate.simulator.computing import single_threaded, versions, want_of_memory
 from ballplate.simulator.experiment import Experiment, unspanned
 from ballplate.simulator.inputs import ExperimentError, UnusableError
 
-from .fingerprint import fingerprint, with_method, without_method
+from .fingerprint import fingerprint
 from .load import base_tree, experiment_of
 from .model import Sweep
 from .store_columns import symbol_column, unit_suffix
@@ -35,14 +36,15 @@ BLOCK = 8192
 
 WITH_MEMORY = "use fewer --workers, and --retry-failed to compute it again"
 
-# Block of a task that computes only the cell's key.
-KEY_ONLY = -1
+# Blocks of tasks that compute only the cell's key, or what its figures take for granted with the
+# effects of assumptions, which take longer than the figures.
+KEY_ONLY, GIVEN_ONLY = -1, -2
 
 
 @dataclass(frozen=True)
 class CellTask:
-    """Work on cell `number`: replicate block `block`, counted from 1; 0 for the rest, KEY_ONLY for
-    the key.
+    """Work on cell `number`: replicate block `block`, counted from 1; 0 for the rest, KEY_ONLY or
+    GIVEN_ONLY.
 
     `total` has the sums over all blocks if there are several.
     """
@@ -57,9 +59,9 @@ class CellResult:
     """Result of a task. `figures` by name, in SI units with the unit in the name; `details` are
     texts.
 
-    `key` is the number of the method and the fingerprint of the cell, or a hash of its choices if
-    they make no valid experiment. A failed row has a `reason`. `seconds` is the computing time,
-    `tally` the sums of a replicate block.
+    `key` is the fingerprint of the cell, or a hash of its choices if they make no valid experiment.
+    A failed row has a `reason`. `seconds` is the computing time, `tally` the sums of a replicate
+    block.
     """
 
     number: int
@@ -99,6 +101,9 @@ def _computed(sweep: Sweep, task: CellTask) -> CellResult:
     if block == KEY_ONLY:
         return CellResult(number, block, key, "done")
     try:
+        if block == GIVEN_ONLY:
+            given = _given(predict(experiment).qualifications)
+            return CellResult(number, block, key, "done", details={"given": given})
         if block:
             tally = block_of_trials(experiment, sweep.trials or 0, seed, block - 1, BLOCK)
             return CellResult(number, block, key, "done", seed=seed, tally=tally)
@@ -126,7 +131,11 @@ def _reason(error: Exception) -> str:
 
 def _whole(sweep: Sweep, experiment: Experiment, task: CellTask, key: str, seed: int) -> CellResult:
     planned = predict(experiment)
-    figures, details = plan_figures(planned, sweep.record)
+    figures = plan_figures(planned, sweep.record)
+    without_assumptions = qualifications_of(
+        planned.verdict.deficiency, planned.scale, None, experiment
+    )
+    details: dict[str, Any] = {"given": _given(without_assumptions)}
     if lost := unspanned(base_tree(sweep, task.number), experiment):
         details["unspanned"] = lost
     if sweep.trials is not None:
@@ -134,19 +143,26 @@ def _whole(sweep: Sweep, experiment: Experiment, task: CellTask, key: str, seed:
             replicates = Trials(seed, combined(experiment, task.total))
         else:
             replicates = trials(experiment, sweep.trials, seed)
-        if replicates.outcome is None:
-            details["monte_carlo"] = replicates.reason
-        else:
-            figures |= trial_figures(replicates.outcome, sweep.record)
-            if replicates.outcome.reason:
-                details["monte_carlo"] = replicates.outcome.reason
-            details["not_converged"] = list(replicates.outcome.failed)
+        outcome = replicates.outcome
+        if outcome is None or outcome.reason:
+            details["monte_carlo"] = replicates.reason if outcome is None else outcome.reason
+        if outcome is not None:
+            figures |= trial_figures(outcome, sweep.record)
             details["flags"] = {
-                name: list(comparison.flags)
-                for name, comparison in replicates.outcome.comparisons.items()
+                symbol: list(comparison.flags)
+                for symbol, comparison in outcome.comparisons.items()
                 if comparison.flags
             }
     return CellResult(task.number, 0, key, "done", "", seed, figures, details)
+
+
+def _given(qualifications: Iterable[Qualification]) -> list[str]:
+    """Return the conditions of a cell's figures, the assumptions in one of them."""
+    found = list(qualifications)
+    given = [each.given for each in found if each.kind != "assumption"]
+    # Too slow for each cell.
+    assumed = [each.given for each in found if each.kind == "assumption"]
+    return given + [f"{' and '.join(assumed)} (assessed for the best case only)"] * bool(assumed)
 
 
 def lost(sweep: Sweep, task: CellTask) -> CellResult:
@@ -166,27 +182,24 @@ def lost(sweep: Sweep, task: CellTask) -> CellResult:
 def key_of(sweep: Sweep, experiment: Experiment) -> str:
     """Return the key of a cell: of its experiment, the recorded quantities, and any data sets."""
     trials = None if sweep.trials is None else (sweep.trials, sweep.seed)
-    return with_method(fingerprint(experiment, trials, sorted(set(sweep.record)), sweep.code))
+    return fingerprint(experiment, trials, sorted(set(sweep.record)), sweep.code)
 
 
 def invalid_key(sweep: Sweep, number: int) -> str:
     """Return the key of a cell without a valid experiment: of its choices and of all files."""
     text = f"{sweep.label(number)}\n{sweep.digest}"
-    digest = hashlib.blake2b(text.encode("utf-8", "surrogatepass"), digest_size=16).hexdigest()
-    return with_method(f"invalid {digest}")
+    return f"invalid {hashlib.sha256(text.encode('utf-8', 'surrogatepass')).hexdigest()}"
 
 
 def seed_of(sweep: Sweep, key: str) -> int:
     """Return the seed of a cell's data sets: of the sweep's seed and of the cell's computation."""
-    # So a cell has the same data sets in any sweep, and after corrections of the method.
-    text = f"{sweep.seed} {without_method(key)}"
+    # So a cell has the same data sets in any sweep.
+    text = f"{sweep.seed} {key}"
     return int.from_bytes(hashlib.blake2b(text.encode(), digest_size=6).digest(), "big")
 
 
-def plan_figures(
-    planned: Prediction, record: tuple[str, ...]
-) -> tuple[dict[str, float], dict[str, Any]]:
-    """Return values and texts of a plan."""
+def plan_figures(planned: Prediction, record: tuple[str, ...]) -> dict[str, float]:
+    """Return the values of a plan."""
     verdict = planned.verdict
     determined = verdict.singular_values[: len(verdict.singular_values) - verdict.deficiency]
     figures = {
@@ -208,17 +221,7 @@ def plan_figures(
         figures[f"{name}_count"] = float(quantity.count)
         if quantity.within_target is not None:
             figures[f"{name}_within_target"] = quantity.within_target
-    details = {
-        "undetermined": [str(direction) for direction in verdict.null],
-        "weak": [str(direction) for direction in verdict.weak],
-        "largest_at": {
-            symbol: quantity.largest
-            for symbol, quantity in planned.quantities.items()
-            if quantity.largest
-        },
-        "given": [each.given for each in planned.qualifications],
-    }
-    return figures, details
+    return figures
 
 
 def trial_figures(outcome: MonteCarloOutcome, record: tuple[str, ...]) -> dict[str, float]:

@@ -52,39 +52,28 @@ def read_rows(
         factor = _factor(row.texts[-1], settings.coverage_factor)
         values = np.full(count, math.nan)
         for k, length in enumerate(lengths):
-            uncertainties_stated = [
-                value
-                for name in (STANDARD, EXPANDED)
-                for value in (extra[f"{length}_{name}"], extra[name])
-                if not math.isnan(value)
+            stated = [
+                (extra[name], name.endswith(EXPANDED))
+                for name in (STANDARD, EXPANDED, f"{length}_{STANDARD}", f"{length}_{EXPANDED}")
+                if not math.isnan(extra[name])
             ]
-            if len(uncertainties_stated) > 1:
-                text = "states an uncertainty twice; leave one column out"
-                problems.add_at(row.mark, steps, text)
-                break
-            if not uncertainties_stated:
+            if not stated:
                 continue
-            is_expanded = not all(math.isnan(extra[n]) for n in (EXPANDED, f"{length}_{EXPANDED}"))
-            text = _wrong(uncertainties_stated[0], is_expanded, factor, row.texts[-1])
+            value, is_expanded = stated[0]
+            text = _wrong(value, is_expanded, factor, row.texts[-1])
+            if len(stated) > 1:
+                text = "states an uncertainty twice; leave one column out"
             if text:
                 problems.add_at(row.mark, steps, text)
                 break
-            values[k] = (
-                uncertainties_stated[0] / (factor or 1.0)
-                if is_expanded
-                else uncertainties_stated[0]
-            )
-        if not is_right_factor(row.texts[-1], extra, columns_allowed):
+            values[k] = value / (factor or 1.0) if is_expanded else value
+        if row.texts[-1] != NO_FACTOR and all(
+            math.isnan(value) for name, value in extra.items() if name.endswith(EXPANDED)
+        ):
             text = "has a coverage factor k and no expanded uncertainty; call the column"
             problems.add_at(row.mark, steps, f"{text} expanded_uncertainty_um, or leave k out")
         uncertainties.append(values)
     return None if len(problems.messages) > before else (rows, uncertainties)
-
-
-def is_right_factor(text: str, extra: dict[str, float], columns_of_row: list[str]) -> bool:
-    """True if an expanded uncertainty has a coverage factor, and a standard one has none."""
-    names = [EXPANDED, *(name for name in columns_of_row if name.endswith(EXPANDED))]
-    return text == NO_FACTOR or any(not math.isnan(extra[name]) for name in names)
 
 
 def _refuse_unclear(lines: list[TableLine], file: str) -> None:

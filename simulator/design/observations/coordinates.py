@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +12,10 @@ from pydantic import Field
 
 from ...geometry.ball_layouts import BallLayout, BallNames, Name, frozen
 from ...geometry.motions import AXIS_NAMES
+from ...geometry.positions import Axis
 from ...inputs.messages import Steps
 from ...inputs.quantities import LengthUncertainty
-from ...inputs.settings import Forms, Settings, Text, hint, listing
+from ...inputs.settings import Forms, Text, hint, listing
 from ...machines.protocol import Array, Integers
 from ..arrays import Design
 from ..lookup import References
@@ -118,14 +120,6 @@ class CoordinateCalibration(Calibration):
 CalibratedBalls = Forms[Literal["all", "corners"], BallNames, BallNames]
 
 
-class SomeAxisLengthsSettings(Settings):
-    """A standard uncertainty for some axes."""
-
-    x: LengthUncertainty | None = Field(None, description="along x; omitted: x is not calibrated")
-    y: LengthUncertainty | None = Field(None, description="along y; omitted: y is not calibrated")
-    z: LengthUncertainty | None = Field(None, description="along z; omitted: z is not calibrated")
-
-
 class CoordinatesSettings(CommonPartSettings):
     """Calibrated co-ordinates of balls in their artefact's frame."""
 
@@ -135,15 +129,15 @@ class CoordinatesSettings(CommonPartSettings):
     )
     balls: CalibratedBalls = Field("all", description="all (default), corners, or a list of balls")
     standard_uncertainty: (
-        Forms[LengthUncertainty, LengthUncertainty, SomeAxisLengthsSettings] | None
+        Forms[LengthUncertainty, LengthUncertainty, dict[Axis, LengthUncertainty]] | None
     ) = Field(
         None,
         description=(
-            "of every co-ordinate, or per axis of the artefact: {x: …, y: …}; 0 um if they are"
-            " exact; left out if values or covariance state it"
+            "of every co-ordinate, or per calibrated axis of the artefact: {x: …, y: …}; 0 um if"
+            " they are exact; left out if values or covariance state it"
         ),
     )
-    axes: tuple[Literal["x", "y", "z"], ...] | None = Field(
+    axes: tuple[Axis, ...] | None = Field(
         None,
         min_length=1,
         description=(
@@ -178,7 +172,7 @@ def read_coordinates(
     if isinstance(uncertainty, float):
         of_axes = np.full(len(axes), uncertainty)
     elif uncertainty is not None:
-        of_axes = np.array(list(uncertainty.stated.values()))
+        of_axes = np.array([uncertainty[axis] for axis in sorted(uncertainty)])
     names = [(layout.names[ball], axis) for ball in balls for axis in axes]
     of_item = None if of_axes is None else np.tile(of_axes, len(balls))
     uncertainties = uncertainties_of(
@@ -194,24 +188,25 @@ def read_coordinates(
     )
     if uncertainties is None:
         return None
+    standard, root = uncertainties
     of_balls = len(np.unique(balls))
     text = (
         f"co-ordinates tie {of_balls} balls together, at most {MOST_TIED_BALLS} are possible; leave"
         f" {joint_key(settings)} out"
     )
-    if uncertainties.root is not None and not references.require(
+    if root is not None and not references.require(
         of_balls <= MOST_TIED_BALLS, (*steps, joint_key(settings)), text
     ):
         return None
-    is_common = of_axes is not None and uncertainties.root is None
+    is_common = of_axes is not None and root is None
     return CoordinateCalibration(
         artefact,
         balls,
         tuple(AXIS_NAMES.index(axis) for axis in axes),
         frozen(values),
         settings.values is not None,
-        frozen(of_axes if is_common else uncertainties.standard.reshape(values.shape)),
-        root=uncertainties.root,
+        frozen(of_axes if is_common else standard.reshape(values.shape)),
+        root=root,
     )
 
 
@@ -220,7 +215,7 @@ def _axes(settings: CoordinatesSettings, steps: Steps, references: References) -
     dimension, uncertainty = references.dimension, settings.standard_uncertainty
     place = (*steps, "standard_uncertainty")
     if uncertainty is None or isinstance(uncertainty, float):
-        axes = list(settings.axes or AXIS_NAMES[:dimension])
+        axes: list[str] = list(settings.axes or get_args(Axis)[:dimension])
         place = (*steps, "axes")
         is_once = references.require(
             len(set(axes)) == len(axes), place, "names an axis twice; name each once"
@@ -228,7 +223,7 @@ def _axes(settings: CoordinatesSettings, steps: Steps, references: References) -
         text = "has no meaning in two dimensions; remove it"
         in_plane = references.require(dimension != 2 or "z" not in axes, place, text)
         return sorted(axes) if is_once and in_plane else None
-    axes = list(uncertainty.stated)
+    axes = sorted(uncertainty)
     if settings.axes is not None:
         text = (
             "belong to the uncertainties of a file; standard_uncertainty names the axes; remove it"
@@ -246,7 +241,7 @@ def _axes(settings: CoordinatesSettings, steps: Steps, references: References) -
 def _certified_coordinates(
     settings: CoordinatesSettings,
     balls: NDArray[np.intp],
-    axes: list[str],
+    axes: Sequence[str],
     layout: BallLayout,
     steps: Steps,
     references: References,
@@ -281,7 +276,7 @@ def _certified_coordinates(
 def _table_of_coordinates(
     settings: CoordinatesSettings,
     balls: NDArray[np.intp],
-    axes: list[str],
+    axes: Sequence[str],
     layout: BallLayout,
     steps: Steps,
     references: References,

@@ -216,7 +216,8 @@ def read_distances(
     )
     if uncertainties is None:
         return None
-    if uncertainties.root is not None and references.artefacts[artefact].role == "length_standard":
+    standard, root = uncertainties
+    if root is not None and references.artefacts[artefact].role == "length_standard":
         text = (
             "a length standard's lengths are read as independent; leave this out, or give"
             f' "{artefact}" the role of a plate'
@@ -230,11 +231,11 @@ def read_distances(
         dimensions,
         frozen(values),
         settings.values is not None,
-        uncertainty if uncertainties.root is None else None,
-        uncertainties.standard,
+        uncertainty if root is None else None,
+        standard,
         settings.form,
         settings.repeatability,
-        root=uncertainties.root,
+        root=root,
     )
 
 

@@ -72,34 +72,15 @@ class LengthArrays:
 
 
 @dataclass(frozen=True)
-class Together:
-    """Lengths `rows` (m,) of one position and probe, in the order of their certificates.
-
-    `root` (m, r) makes of them r lengths with uncorrelated noise of unit variance. `by_error` (r,
-    m) is their derivative by the errors of the certificates, in their uncertainties, without the
-    part that the m lengths determine.
-    """
-
-    rows: Integers
-    root: Array
-    by_error: Array
-
-
-@dataclass(frozen=True)
-class Consistency:
-    """Noise-free information of lengths on their own certificates.
-
-    `rows` (k, m) are the same m lengths in k positions, `equations` (e, m) the noise-free
-    combinations of their mean.
-    """
-
-    rows: Integers
-    equations: Array
-
-
-@dataclass(frozen=True)
 class JointWhitening:
     """Whitening of the lengths of one standard that share readings.
+
+    `together` has the lengths (m,) of each position and probe, in the order of their certificates,
+    a root (m, r) that makes of them r lengths with uncorrelated noise of unit variance, and the
+    derivative (r, m) of these by the errors of the certificates, in their uncertainties, without
+    the part that the m lengths determine. `consistencies` are the noise-free information of lengths
+    on their own certificates: the same m lengths in k positions (k, m), and the noise-free
+    combinations (e, m) of their mean.
 
     Of the errors of certificates, in their uncertainties, lengths read together determine q
     combinations without noise: `known` (q, equations) forms these from the equations in
@@ -108,8 +89,8 @@ class JointWhitening:
     shared diag(gain) shared').
     """
 
-    together: tuple[Together, ...]
-    consistencies: tuple[Consistency, ...]
+    together: tuple[tuple[Integers, Array, Array], ...]
+    consistencies: tuple[tuple[Integers, Array], ...]
     known: Array
     by_known: Array
     shared: Array
@@ -120,17 +101,10 @@ class JointWhitening:
 
     def whitened(self, rows: Array) -> Array:
         """Of all lengths' `rows` (lengths, k) uncorrelated ones (len, k) of unit variance."""
-        means = [
-            consistency.equations @ rows[consistency.rows].mean(axis=0)
-            for consistency in self.consistencies
-        ]
+        means = [equations @ rows[same].mean(axis=0) for same, equations in self.consistencies]
         known_rows = self.known @ np.concatenate([np.zeros((0, rows.shape[1])), *means])
-        first = (
-            np.concatenate(
-                [consistency.root.T @ rows[consistency.rows] for consistency in self.together]
-            )
-            - self.by_known @ known_rows
-        )
+        first = np.concatenate([root.T @ rows[lengths] for lengths, root, _ in self.together])
+        first -= self.by_known @ known_rows
         first = first - self.shared @ (self.gain[:, None] * (self.shared.T @ first))
         return np.concatenate([first, known_rows])
 
@@ -140,31 +114,15 @@ class JointWhitening:
         first = first - self.shared @ (self.gain[:, None] * (self.shared.T @ first))
         by_mean = self.known.T @ (known_part - self.by_known.T @ first)
         start = 0
-        for group in self.together:
-            stop = start + group.root.shape[1]
-            into[group.rows] += group.root @ first[start:stop]
+        for lengths, root, _ in self.together:
+            stop = start + root.shape[1]
+            into[lengths] += root @ first[start:stop]
             start = stop
         start = 0
-        for consistency in self.consistencies:
-            stop = start + len(consistency.equations)
-            into[consistency.rows] += (
-                consistency.equations.T @ by_mean[start:stop] / len(consistency.rows)
-            )
+        for same, equations in self.consistencies:
+            stop = start + len(equations)
+            into[same] += equations.T @ by_mean[start:stop] / len(same)
             start = stop
-
-
-@dataclass(frozen=True)
-class ByPosition:
-    """Rows of lengths, position by position, in units of the readings' noise alone.
-
-    `length` (r,) is a length of each row's position, `rows` (r, k) are uncorrelated and of unit
-    variance except the errors of certificates, in their uncertainties, and `by_error` (r,
-    certificates) is the derivative by these.
-    """
-
-    length: Integers
-    rows: Array
-    by_error: Array
 
 
 @dataclass(frozen=True)
@@ -210,9 +168,13 @@ class LengthWhitening:
             start += len(joint_whitening)
         return result.reshape(-1, *rows.shape[1:])
 
-    def by_position(self, lengths: LengthArrays, rows: Array) -> ByPosition:
-        """Return rows (r, k) of each position, of lengths' `rows` (m, k), without other positions.
+    def by_position(self, lengths: LengthArrays, rows: Array) -> tuple[Integers, Array, Array]:
+        """Return a length (r,) of each position's rows, these rows (r, k), of lengths' `rows` (m,
+        k), without other positions, and their derivative (r, certificates) by the errors of
+        certificates, in their uncertainties.
 
+        Rows are in units of the readings' noise alone, uncorrelated and of unit variance except the
+        errors of certificates.
         A position uses no contradictions of certificates found by others; if all read the same
         lengths of a standard, these add no information.
         """
@@ -227,13 +189,13 @@ class LengthWhitening:
             -weight[scatters] * lengths.uncertainty[common]
         )
         length, parts, by_error = [alone], [weight[:, None] * rows[alone]], [of_errors]
-        for group in (group for joint in self.joint for group in joint.together):
-            count = group.root.shape[1]
-            length.append(np.repeat(group.rows[:1], count))
-            parts.append(group.root.T @ rows[group.rows])
+        for chosen, root, errors in (group for joint in self.joint for group in joint.together):
+            count = root.shape[1]
+            length.append(np.repeat(chosen[:1], count))
+            parts.append(root.T @ rows[chosen])
             by_error.append(np.zeros((count, of_errors.shape[1])))
-            by_error[-1][:, lengths.certificate[group.rows]] = group.by_error
-        return ByPosition(np.concatenate(length), np.concatenate(parts), np.concatenate(by_error))
+            by_error[-1][:, lengths.certificate[chosen]] = errors
+        return np.concatenate(length), np.concatenate(parts), np.concatenate(by_error)
 
 
 def length_whitening_of(
@@ -297,9 +259,7 @@ def joint_whitening(
         certificate_rows = certificate[np.searchsorted(chosen, same[0])]
         outside = _outside(groups[members[0]][1], uncertainty, size)
         if len(outside):
-            consistencies.append(
-                Consistency(same, outside / np.maximum(uncertainty, SMALLEST * size))
-            )
+            consistencies.append((same, outside / np.maximum(uncertainty, SMALLEST * size)))
             equations_found.append(np.zeros((len(outside), count)))
             equations_found[-1][:, certificate_rows] = outside
         for k in members:
@@ -307,7 +267,7 @@ def joint_whitening(
             by_error = -root.T * uncertainty
             errors.append(np.zeros((root.shape[1], count)))
             errors[-1][:, certificate_rows] = by_error
-            together.append(Together(rows, root, by_error - (by_error @ outside.T) @ outside))
+            together.append((rows, root, by_error - (by_error @ outside.T) @ outside))
     known_directions, directions = _independent(
         np.concatenate(equations_found), len(consistencies) == 1
     )

@@ -132,11 +132,6 @@ class JointValues(BallObservations):
         )
         return replace(self, roots=roots, uncertainty=divisors)
 
-    def enlarged(self, times: Array) -> JointValues:
-        parts = zip(self._parts, self.roots, strict=True)
-        roots = tuple(replace(root, own=root.own * times[part]) for part, root in parts)
-        return replace(self, roots=roots, uncertainty=self.uncertainty * times)
-
     def loosened(self, least: float) -> JointValues:
         """Return the same with a small variance for combinations without any, relative to that of
         their values.

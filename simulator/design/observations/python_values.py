@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Literal, Protocol
@@ -14,10 +14,8 @@ from ...geometry.ball_layouts import BallLayout, Name, frozen
 from ...inputs.messages import Steps
 from ...inputs.own_code import own_array
 from ...inputs.quantities import (
+    PARSERS,
     QuantityError,
-    parse_angle,
-    parse_length,
-    parse_ratio,
     with_quantities,
 )
 from ...inputs.settings import Forms, NonEmpty, Text, listing
@@ -40,17 +38,6 @@ from .stated_values import (
 from .whitening import CovarianceRoot, at_least_exact, covariance_root
 
 GROUP = "ballplate.calibrations"
-PARSERS: dict[str, Callable[[object], float]] = {
-    "m": parse_length,
-    "rad": parse_angle,
-    "1": parse_ratio,
-}
-
-# Balls are displaced by this share of the artefact's extent for quotients of differences, which
-# agree with derivatives to this share of the largest.
-STEP, DERIVATIVE = 1e-6, 1e-5
-# What a motion of the whole artefact may change of a value, in parts of its largest derivative.
-OF_FRAME = 1e-6
 
 
 class BallFunctions(Protocol):
@@ -211,7 +198,7 @@ def read_python_values(
     )
     if uncertainties is None:
         return None
-    root = uncertainties.root or covariance_root(np.diag(uncertainties.standard**2))
+    standard, root = uncertainties
     return PythonCalibration(
         artefact,
         settings.object,
@@ -221,8 +208,8 @@ def read_python_values(
         np.asarray(balls, np.int64),
         frozen(values),
         settings.values is not None,
-        uncertainties.standard,
-        root,
+        standard,
+        root or covariance_root(np.diag(standard**2)),
     )
 
 
@@ -255,10 +242,10 @@ class GuardedFunctions:
     unit: Unit
 
     def values(self, balls: Array) -> Array:
-        return own_array(self.functions.values, (len(self.names),), balls)
+        return own_array(self.functions.values, (len(self.names),), balls.copy())
 
     def derivatives(self, balls: Array) -> Array:
-        return own_array(self.functions.derivatives, (len(self.names), *balls.shape), balls)
+        return own_array(self.functions.derivatives, (len(self.names), *balls.shape), balls.copy())
 
 
 def _values(
@@ -359,55 +346,7 @@ def _checked(name: str, functions: Any, drawn: Array) -> BallFunctions:
         raise CustomModelError(f"{name}: {text}")
     if (unit := functions.unit) not in PARSERS:
         raise CustomModelError(f'{name}: the unit is "{unit}"; known: m, rad, 1')
-    m, (n, d) = len(names), drawn.shape
-    extent = float(np.ptp(drawn, axis=0).max()) or 1.0
-
-    def found(noun: str, balls: Array, shape: tuple[int, ...]) -> Array:
-        returned = np.asarray(
-            attempt(f"{name}: {noun} has failed", lambda: getattr(functions, noun)(balls.copy()))
-        )
-        if returned.shape != shape:
-            text = f"{noun} returns the shape {returned.shape}; {shape} is needed"
-            raise CustomModelError(f"{name}: {text}")
-        if returned.dtype.kind not in "fiu" or not np.isfinite(returned).all():
-            raise CustomModelError(f"{name}: {noun} returns values that are not finite numbers")
-        return np.asarray(returned, float)
-
-    found("values", drawn, (m,))
-    generator = np.random.default_rng(np.random.SeedSequence(1))
-    for balls in (drawn, drawn + 1e-4 * extent * generator.standard_normal((n, d))):
-        slope = found("derivatives", balls, (m, n, d))
-        size = np.abs(slope).max(axis=(1, 2))
-        for _ in range(3):
-            way = generator.standard_normal((n, d))
-            step = STEP * extent * way
-            change = found("values", balls + step, (m,)) - found("values", balls - step, (m,))
-            off = np.abs(change / (2.0 * STEP * extent) - np.tensordot(slope, way, axes=2))
-            wrong = np.flatnonzero(off > DERIVATIVE * np.maximum(size, 1e-300) * np.sqrt(n * d))
-            if len(wrong):
-                names_listed = ", ".join(names[int(wrong[0])])
-                text = f'derivatives is not the derivative of values for "{names_listed}"'
-                raise CustomModelError(f"{name}: {text}")
-        for motion in _motions(balls):
-            moved = np.abs(np.tensordot(slope, motion, axes=2))
-            wrong = np.flatnonzero(moved > OF_FRAME * size * np.sqrt(n))
-            if len(wrong):
-                names_listed = ", ".join(names[int(wrong[0])])
-                text = (
-                    f'"{names_listed}" depends on where the frame of the artefact is; only'
-                    " functions of"
-                    " distances and angles are possible, co-ordinates have kind: coordinates"
-                )
-                raise CustomModelError(f"{name}: {text}")
-    return GuardedFunctions(functions, names, unit)
-
-
-def _motions(balls: Array) -> list[Array]:
-    """Return rigid motions (n, d) of balls, each moving no ball by more than one."""
-    n, d = balls.shape
-    shifts = [np.tile(np.eye(d)[axis], (n, 1)) for axis in range(d)]
-    centred = np.zeros((n, 3))
-    centred[:, :d] = balls - balls.mean(axis=0)
-    size = float(np.abs(centred).max()) or 1.0
-    turns = [np.cross(axis, centred / size)[:, :d] for axis in np.eye(3)[0 if d == 3 else 2 :]]
-    return shifts + turns
+    guarded = GuardedFunctions(functions, names, unit)
+    guarded.values(drawn)
+    guarded.derivatives(drawn)
+    return guarded

@@ -19,7 +19,7 @@ from ...inputs.problems import Problems
 from ...inputs.quantities import CommonPart
 from ...inputs.settings import Settings, Text, hint, listing, shorten
 from ...inputs.yamltree import Mark
-from ...machines.protocol import Array, Integers
+from ...machines.protocol import Array
 from ..lookup import References
 from .joint_values import MOST_JOINT_VALUES
 from .whitening import CovarianceRoot, IndefiniteError, covariance_root
@@ -87,16 +87,6 @@ class CertificateEntry:
 
 
 @dataclass(frozen=True)
-class Uncertainties:
-    """Standard uncertainties (m,) of values in metres, and the root of their covariance if they
-    are correlated.
-    """
-
-    standard: Array
-    root: CovarianceRoot | None = None
-
-
-@dataclass(frozen=True)
 class FileValues:
     """Content of a file: its entries, and of a digital certificate a covariance (m, m) with its
     rounding of the requested values.
@@ -158,66 +148,87 @@ def uncertainties_of(
     lengths: Array,
     steps: Steps,
     references: References,
-) -> Uncertainties | None:
-    """Return uncertainties of values with `names`: those stated (m,) with the item, or those read
-    (m,) from its file, and those of a covariance; or report faults.
+) -> tuple[Array, CovarianceRoot | None] | None:
+    """Return standard uncertainties (m,) of values with `names`, in metres: those stated (m,) with
+    the item, or those read (m,) from its file, or those of a covariance, and the root of this if
+    they are correlated; or report faults.
 
     A part that they have in common is that at the nominal `lengths` (m,), with signs for
     co-ordinates.
     """
     problems, path = references.problems, (*steps, "standard_uncertainty")
-    in_file = not np.isnan(uncertainties_read).any()
-    matrix = covariance
-    if settings.covariance is not None:
-        matrix = _of_file(
-            settings,
-            names,
-            is_pair,
-            stated_uncertainty if stated_uncertainty is not None else uncertainties_read,
-            steps,
-            references,
-        )
-        if matrix is None:
-            return None
-    is_correlation = settings.covariance is not None and len(matrix or ()) == 3
-    states = in_file or (matrix is not None and not is_correlation)
-    if stated_uncertainty is not None and states:
-        where = settings.values if in_file or not settings.covariance else settings.covariance
-        problems.add(path, f"{where} states uncertainties; remove one of the two", of_key=True)
-        return None
-    of_values = np.diag(matrix[0]) if states and matrix is not None else uncertainties_read
-    without = np.flatnonzero(np.isnan(of_values))
-    if 0 < len(without) < len(of_values):
+    without = np.flatnonzero(np.isnan(uncertainties_read))
+    if covariance is None and 0 < len(without) < len(names):
         names_listed = listing(value_name(names[k], is_pair) for k in without.tolist())
         text = f"states no uncertainty of {names_listed}, and of others it does; leave these out"
         problems.add((*steps, "values"), text)
         return None
-    if stated_uncertainty is None and not states:
+    of_values = stated_uncertainty
+    if not len(without):
+        of_values = uncertainties_read
+    matrix, where = covariance, settings.values
+    if settings.covariance is not None:
+        named = _of_file(settings, names, is_pair, steps, references)
+        if named is None:
+            return None
+        is_correlation, values, rounding = named
+        if not is_correlation:
+            matrix = covariance = values, rounding
+            where = settings.covariance
+        elif of_values is None:
+            text = 'missing; a correlation needs "standard_uncertainty", or uncertainties in values'
+            problems.add(path, text)
+            return None
+        else:
+            scale = np.outer(of_values, of_values)
+            # A value's correlation with itself is 1, to whatever digits.
+            np.fill_diagonal(rounding, 0.0)
+            matrix = values * scale, rounding * scale
+    is_stated_there = covariance is not None or not len(without)
+    if stated_uncertainty is not None and is_stated_there:
+        problems.add(path, f"{where} states uncertainties; remove one of the two", of_key=True)
+        return None
+    if matrix is None and of_values is None:
         text = 'missing; add "standard_uncertainty", or values with their uncertainties'
         problems.add(path, text)
         return None
     place = (*steps, joint_key(settings))
-    if matrix is None:
-        of_values = uncertainties_read if stated_uncertainty is None else stated_uncertainty
+    if matrix is None and of_values is not None:
         common = _common(settings, of_values, lengths)
         if common is None:
-            return Uncertainties(_frozen(of_values))
+            return _frozen(of_values), None
         matrix = common, np.zeros_like(common)
+    assert matrix is not None
     size = np.sqrt(np.diag(matrix[0]))
-    if in_file and not is_correlation:
-        wrong = np.flatnonzero(
-            np.abs(size - uncertainties_read) > AGREE * np.maximum(size, uncertainties_read) + 1e-12
-        )
-        if len(wrong):
-            problems.add(place, _disagreement(names, is_pair, size, uncertainties_read, wrong))
-            return None
+    has_both = covariance is not None and not len(without)
+    if has_both and (text := _disagreement(names, is_pair, size, uncertainties_read)):
+        problems.add(place, text)
+        return None
     if len(size) > MOST_JOINT_VALUES:
         problems.add(
             place, f"{len(size)} correlated values; at most {MOST_JOINT_VALUES} are possible"
         )
         return None
     root = _root_of(matrix, place, problems)
-    return None if root is None else Uncertainties(_frozen(size), root)
+    return None if root is None else (_frozen(size), root)
+
+
+def _disagreement(
+    names: Sequence[tuple[str, str]], is_pair: bool, size: Array, uncertainties_read: Array
+) -> str:
+    """Return the fault of uncertainties (m,) in a covariance that differ from those beside it;
+    possibly empty.
+    """
+    apart = np.abs(size - uncertainties_read)
+    wrong = np.flatnonzero(apart > AGREE * np.maximum(size, uncertainties_read) + 1e-12)
+    if not len(wrong):
+        return ""
+    k = int(wrong[0])
+    return (
+        f"the covariance has the standard uncertainty {1e6 * size[k]:.4g} µm for"
+        f" {value_name(names[k], is_pair)}, beside it stands {1e6 * uncertainties_read[k]:.4g} µm;"
+        " is one of the two expanded? State standard uncertainties and their covariance"
+    )
 
 
 def _root_of(matrix: tuple[Array, ...], place: Steps, problems: Problems) -> CovarianceRoot | None:
@@ -249,38 +260,15 @@ def _common(settings: Any, of_values: Array, lengths: Array) -> Array | None:
     return np.asarray(np.diag(of_values**2) + np.outer(common, common))
 
 
-def _disagreement(
-    names: Sequence[tuple[str, str]],
-    is_pair: bool,
-    size: Array,
-    uncertainties_read: Array,
-    wrong: Integers,
-) -> str:
-    k = int(wrong[0])
-    text = (
-        f"the covariance has the standard uncertainty {1e6 * size[k]:.4g} µm for"
-        f" {value_name(names[k], is_pair)}, beside it stands {1e6 * uncertainties_read[k]:.4g} µm"
-    )
-    ratio = size[wrong] / np.maximum(uncertainties_read[wrong], 1e-300)
-    if len(wrong) == len(size) and np.ptp(ratio) < 0.05 * ratio.mean() and ratio.mean() < 10.0:
-        text += (
-            f", always {ratio.mean():.3g} times; is one of the two expanded? State standard"
-            " uncertainties and their covariance"
-        )
-        return text
-    return f"{text}; correct one of the two"
-
-
 def _of_file(
     settings: Any,
     names: Sequence[tuple[str, str]],
     is_pair: bool,
-    standard: Array,
     steps: Steps,
     references: References,
-) -> Any:
-    """Return covariance and rounding (m, m) of values from a CSV file, with a third entry for
-    correlations; or report faults.
+) -> tuple[bool, Array, Array] | None:
+    """Return whether a CSV file has correlations, and its matrix (m, m) of the values with its
+    rounding; or report faults.
     """
     from ...inputs.covariances import read_matrix
 
@@ -312,20 +300,8 @@ def _of_file(
     if messages:
         problems.take(ExperimentError(messages), place)
         return None
-    values, rounding = (
-        matrix.values[np.ix_(entry_of_name, entry_of_name)],
-        matrix.rounding[np.ix_(entry_of_name, entry_of_name)],
-    )
-    if not matrix.is_correlation:
-        return values, rounding
-    scale = np.outer(standard, standard)
-    if np.isnan(standard).any():
-        text = 'missing; a correlation needs "standard_uncertainty", or uncertainties in values'
-        problems.add((*steps, "standard_uncertainty"), text)
-        return None
-    # A value's correlation with itself is 1, to whatever digits.
-    np.fill_diagonal(rounding, 0.0)
-    return values * scale, rounding * scale, True
+    chosen = np.ix_(entry_of_name, entry_of_name)
+    return matrix.is_correlation, matrix.values[chosen], matrix.rounding[chosen]
 
 
 def _frozen(values: Array) -> Array:

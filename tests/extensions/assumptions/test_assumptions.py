@@ -75,7 +75,7 @@ def random_sections(seed: int) -> dict[str, Any]:
     return sections
 
 
-@pytest.mark.parametrize("first", [0, 10, 20])
+@pytest.mark.parametrize("first", [0, *(pytest.param(k, marks=pytest.mark.long) for k in (10, 20))])
 def test_rows_are_runs_of_the_file_with_their_entries(first: int, tmp_path: Path) -> None:
     path = tmp_path / "e.yaml"
     for seed in range(first, first + 10):

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import re
-from collections.abc import Iterator
 from pathlib import Path
 
 import ballplate as bp
@@ -19,7 +16,6 @@ from ballplate.extensions.campaign.next_position import (
     with_positions,
 )
 from ballplate.extensions.campaign.next_result import NextStep
-from ballplate.extensions.campaign.watching_command import settled
 from ballplate.extensions.requirements.goals import GoalError, parse_goal
 from ballplate.results import given_words
 from ballplate.simulator.experiment.loading import load
@@ -159,46 +155,16 @@ def test_without_redundancy_nothing_is_known_of_the_scatter() -> None:
     assert "target not met" in found.lines()[0] and found.to_dict()["target_met"] is False
 
 
-def test_positions_read_again_replace_earlier_ones(readings: pandas.DataFrame) -> None:
-    other = bp.simulate(QUICKSTART, 6)
-    wrong = readings.copy()
-    wrong.loc[wrong.position == "x low", "x_mm"] += 0.01 * wrong.index[wrong.position == "x low"]
-    both = pandas.concat([wrong, of(other, "x low")], ignore_index=True)
-    expected = pandas.concat([readings[readings.position != "x low"], of(other, "x low")])
-    found, plain = judged(both), judged(expected)
-    assert found.observed.redone == (wording.LOW_WAS_READ_AGAIN_READINGS,)
-    assert found.fit is not None and plain.fit is not None
-    assert found.fit.solution.factor.sum_of_squares == pytest.approx(
-        plain.fit.solution.factor.sum_of_squares, rel=1e-9
-    )
-    assert wording.LOW_WAS_READ_AGAIN in found.lines()[1] and found.read == (
-        *NAMES[:2],
-        *NAMES[3:],
-        "x low",
-    )
-    # In a file of its own as well.
-    texts = [GivenText("a.csv", wrong.to_csv(index=False))]
-    texts.append(GivenText("b.csv", of(other, "x low").to_csv(index=False)))
-    again = next_step(bp.quickstart(), texts, parse_goal("lengths"))
-    assert again.to_dict()["redone"] == list(found.observed.redone)
-    assert again.to_dict()["U6_average"] == found.to_dict()["U6_average"]
+def test_a_position_read_again_under_its_name_is_refused(readings: pandas.DataFrame) -> None:
+    with pytest.raises(bp.ExperimentError, match="x low"):
+        judged(pandas.concat([readings, of(bp.simulate(QUICKSTART, 6), "x low")]))
 
 
-def test_repeats_within_a_run_replace_single_readings(readings: pandas.DataFrame) -> None:
-    first = of(readings, "z low")
-    bad = first.iloc[[3]].copy()
-    bad["z_mm"] += 0.05
-    table = pandas.concat([first.iloc[:3], bad, first.iloc[3:], readings.iloc[25:]])
-    found = judged(table)
-    assert found.observed.redone == (wording.LOW_OF_READING_THAT_IS_REPEATED,)
-    assert found.is_met
-
-
-def test_what_goes_on_with_a_position_replaces_nothing(readings: pandas.DataFrame) -> None:
-    # Sorted by ball, and by probe: no ball is read twice by a probe.
-    for columns in (["ball"],):
-        found = judged(readings.sort_values(columns, kind="stable"))
-        assert not found.observed.redone and found.is_met and not found.missing
+def test_the_order_of_readings_within_a_position_does_not_matter(
+    readings: pandas.DataFrame,
+) -> None:
+    found = judged(readings.sort_values("ball", kind="stable"))
+    assert found.is_met and not found.missing
 
 
 def test_an_interrupted_position_is_completed_first(readings: pandas.DataFrame) -> None:
@@ -266,90 +232,3 @@ def test_the_command_begins_with_the_verdict(
     assert main(["next", QUICKSTART, str(table), "--target", "0.01 um", "--json"]) == 1
     told = json.loads(capsys.readouterr().out)
     assert told["target_met"] is False and told["next"] is None
-    assert main(["next", QUICKSTART, str(table), "--interval", "1"]) == 2
-    assert main(["next", QUICKSTART, "--watch", str(tmp_path / "nowhere")]) == 2
-
-
-def looks(folder: Path, steps: list[Iterator[None]]) -> Iterator[list[str]]:
-    """Names of what has settled after each of some steps that write files."""
-
-    def wait() -> None:
-        if not steps:
-            raise KeyboardInterrupt
-        next(steps.pop(0), None)
-
-    for found in settled(folder, wait):
-        yield [path.name for path in found]
-
-
-def test_files_are_waited_for_until_they_are_whole(tmp_path: Path) -> None:
-    def write(name: str, text: str, time: int) -> Iterator[None]:
-        path = tmp_path / name
-        path.write_text(text, "utf-8")
-        os.utime(path, (time, time))
-        yield
-
-    def nothing() -> Iterator[None]:
-        yield
-
-    steps = [
-        write("b.csv", "", 1),
-        write("b.csv", "x", 1),
-        # Grown between two looks: not whole yet.
-        write("b.csv", "xy", 2),
-        write("notes.pdf", "x", 2),
-        write("a.csv", "z", 3),
-        nothing(),
-        nothing(),
-        write("b.csv", "xyz", 4),
-        nothing(),
-    ]
-    with pytest.raises(KeyboardInterrupt):
-        found = []
-        for names in looks(tmp_path, steps):
-            found.append((names, len(steps)))
-    assert found == [
-        (["b.csv"], 5),
-        (["b.csv", "a.csv"], 3),
-        (["a.csv"], 1),
-        (["a.csv", "b.csv"], 0),
-    ]
-
-
-def test_a_folder_is_watched_until_the_target_is_met(
-    tmp_path: Path,
-    readings: pandas.DataFrame,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    waits = []
-
-    def sleep(seconds: float) -> None:
-        waits.append(seconds)
-        parts = {1: readings.iloc[:100], 4: readings.iloc[100:]}
-        if len(waits) == 2:
-            (tmp_path / "wrong.csv").write_text("nothing of use\n1,2\n", "utf-8")
-        if len(waits) == 4:
-            (tmp_path / "wrong.csv").unlink()
-        if len(waits) in parts:
-            parts[len(waits)].to_csv(tmp_path / f"{len(waits)}.csv", index=False)
-
-    monkeypatch.setattr("time.sleep", sleep)
-    assert main(["next", QUICKSTART, "--watch", str(tmp_path), "--interval", "0.5"]) == 0
-    told = capsys.readouterr()
-    lines = told.out.splitlines()
-    answers = [line for line in lines if " positions read, last " in line]
-    assert answers[0].startswith(wording.POSITIONS_READ_LAST_LOW)
-    assert len(answers) >= 2 and re.search("target met, given .*: stop$", answers[-1])
-    assert "wrong.csv" in told.err and set(waits) == {0.5}
-
-
-def test_a_watch_that_is_interrupted_has_not_met_the_target(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def sleep(seconds: float) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("time.sleep", sleep)
-    assert main(["next", QUICKSTART, "--watch", str(tmp_path)]) == 1
-    assert wording.STOPPED_BEFORE_THE_TARGET_WAS_MET in capsys.readouterr().err

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from dataclasses import replace
 from functools import cache
@@ -170,49 +169,6 @@ def test_in_two_dimensions_it_says_what_fit_says() -> None:
 def of_simulated(seed: int = 1) -> Any:
     experiment = bp.experiment({**IN_SPACE, "error_model": {"kind": "metric"}})
     return bp.fit(experiment, bp.simulate(experiment, seed))
-
-
-def test_archive_holds_values_uncertainties_and_correlations(tmp_path: Path) -> None:
-    found = of_simulated().certificate()
-    found.save(tmp_path / "plate.json")
-    archive = json.loads((tmp_path / "plate.json").read_text())
-    names = [f"{name} {axis}" for name in found.names for axis in "xyz"]
-    tagged, leaves = archive["tagged_real"], archive["leaf_nodes"]
-    assert list(tagged) == names
-    values = [tagged[name].get("x", tagged[name].get("value")) for name in names]
-    assert values == found.coordinates.ravel().tolist()
-    covariance = np.zeros((len(names), len(names)))
-    for i, one in enumerate(names):
-        for j, two in enumerate(names):
-            first, second = (leaves.get(tagged[name]["uid"]) for name in (one, two))
-            if first and second:
-                r = first["correlation"][second["uid"]]
-                covariance[i, j] = first["u"] * r * second["u"]
-    assert np.abs(covariance - found.covariance).max() < 1e-12 * np.abs(covariance).max()
-    assert {one["df"] for one in leaves.values()} == {found.degrees_of_freedom}
-
-
-@pytest.mark.filterwarnings("default")
-def test_the_gum_tree_calculator_reads_the_archive(tmp_path: Path) -> None:
-    pytest.importorskip("GTC")
-    from GTC import get_correlation, sqrt  # type: ignore[import-not-found, unused-ignore]
-    from GTC.persistence import load_json  # type: ignore[import-not-found, unused-ignore]
-
-    found = of_simulated().certificate()
-    found.save(tmp_path / "plate.json")
-    with (tmp_path / "plate.json").open() as stream:
-        archive = load_json(stream)
-    for one in found.distances[:10]:
-        apart = [archive[f"{one.balls[0]} {a}"] - archive[f"{one.balls[1]} {a}"] for a in "xyz"]
-        length = sqrt(sum(part * part for part in apart))
-        assert length.x == pytest.approx(one.length, rel=1e-14)
-        assert length.u == pytest.approx(one.standard_uncertainty, rel=1e-6)
-        assert length.df == pytest.approx(found.degrees_of_freedom)
-    assert archive["r1c1 x"].u == 0.0
-    r = get_correlation(archive["r1c2 x"], archive["r3c3 y"])
-    i, j = 3 * found.names.index("r1c2"), 3 * found.names.index("r3c3") + 1
-    size = np.sqrt(np.diag(found.covariance))
-    assert r == pytest.approx(found.covariance[i, j] / size[i] / size[j], rel=1e-12)
 
 
 def test_page_has_every_figure_and_nothing_from_elsewhere(tmp_path: Path) -> None:
@@ -397,7 +353,7 @@ def test_names_of_balls_are_told_apart(tmp_path: Path) -> None:
     experiment = bp.experiment(sections)
     found = bp.fit(experiment, bp.simulate(experiment)).certificate(about=ABOUT)
     assert list(found.names) == names
-    for ending in (".xml", ".csv", ".json", ".html"):
+    for ending in (".xml", ".csv", ".html"):
         found.save(tmp_path / f"plate{ending}")
     for more in (
         {"values": "plate.xml"},

@@ -1,7 +1,8 @@
-"""`certificate` and `adjust` as a user meets them."""
+"""`certificate` as a user meets it."""
 
 from __future__ import annotations
 
+import csv
 import json
 import shutil
 from pathlib import Path
@@ -11,7 +12,6 @@ import pytest
 import yaml
 from ballplate.cli import main
 
-from tests.extensions.certificates import wording
 from tests.extensions.certificates.campaigns import IN_SPACE
 
 
@@ -50,11 +50,12 @@ def test_printed_and_written_are_the_same(folder: Path, capsys: pytest.CaptureFi
     assert main([*line, "--json"]) == 0
     told = json.loads(capsys.readouterr().out)
     assert told["coverage_factor"] == 3.0
-    assert main([*line, "--json", "-o", str(folder / "p.json")]) == 0
+    assert main([*line, "--json", "-o", str(folder / "p.csv"), "--force"]) == 0
     assert json.loads(capsys.readouterr().out) == told
-    archive = json.loads((folder / "p.json").read_text())
-    place = told["balls"]["r3c3"]["y"]["value"]
-    assert archive["tagged_real"]["r3c3 y"]["x"] == place
+    with (folder / "p.csv").open(newline="", encoding="utf-8") as stream:
+        table = (line for line in stream if not line.startswith("#"))
+        rows = {row["ball"]: row for row in csv.DictReader(table)}
+    assert float(rows["r3c3"]["y_mm"]) == pytest.approx(1e3 * told["balls"]["r3c3"]["y"]["value"])
     assert main(line) == 0
     text = capsys.readouterr().out
     assert "U = 3 u" in text and "not a calibration certificate" in text
@@ -66,8 +67,6 @@ def test_wrong_usage_is_told_in_one_line(folder: Path, capsys: pytest.CaptureFix
         (["certificate", readings, "--datum", "r1c1,r9c9,r1c3"], 'no ball "r9c9"'),
         (["certificate", readings, "--about", "datum=x"], "the certificate has no entry"),
         (["certificate", readings, "-o", str(folder / "p.xml")], "when the plate was measured"),
-        (["adjust"], "--scale or --turn"),
-        (["adjust", "--scale", "x=1 um"], "a ratio is expected"),
     ):
         assert main([more[0], experiment, *more[1:]]) == 2
         assert told in capsys.readouterr().err.splitlines()[-1]
@@ -86,40 +85,3 @@ def test_a_plate_without_a_calibration_has_no_certificate(
     assert main([*line, "-o", str(folder / "u.html")]) == 3
     assert "determine no length of the plate" in capsys.readouterr().err
     assert not (folder / "u.html").exists()
-
-
-def test_adjust_takes_maps_and_experiments(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    experiment, first, second = (str(folder / name) for name in ("e.yaml", "r.csv", "r2.csv"))
-    naming = []
-    for name in ("r.csv", "r2.csv"):
-        naming.append(str(folder / f"names-{name}.yaml"))
-        text = (folder / "e.yaml").read_text("utf-8")
-        Path(naming[-1]).write_text(f"{text}\nreadings: {{files: [{name}]}}\n", "utf-8")
-    maps = [str(folder / name) for name in ("1.yaml", "2.npz")]
-    for readings, name in zip((first, second), maps, strict=True):
-        assert main(["fit", experiment, readings, "-o", name]) == 0
-    capsys.readouterr()
-    results = []
-    for line in (
-        [naming[0], "--after", naming[1]],
-        [maps[0], "--after", maps[1]],
-        [naming[0], "--after", maps[1]],
-    ):
-        assert main(["adjust", *line, "--scale", "x=0 ppm", "--json"]) == 0
-        results.append(json.loads(capsys.readouterr().out))
-    one = results[0]
-    assert one["coverage_factor"] == 3.0 and one["within"] is True
-    for other in results[1:]:
-        for mine, same in zip(
-            other["difference"]["tests"], one["difference"]["tests"], strict=True
-        ):
-            assert mine["chi_squared"] == pytest.approx(same["chi_squared"], rel=1e-6)
-    # A machine that was not adjusted as stated.
-    line = ["adjust", maps[0], "--after", maps[1], "--turn", "y-x=0.1 turns of 1 mm at 1 m"]
-    assert main([*line, "-o", str(folder / "after.yaml")]) == 1
-    assert "not as predicted" in capsys.readouterr().out
-    assert main(["adjust", str(folder / "after.yaml"), "--turn", "y+x=100 urad"]) == 0
-    out = capsys.readouterr().out
-    assert wording.AS_PREDICTED_AFTER_ADJUSTMENT not in out and "1 change, predicted" in out

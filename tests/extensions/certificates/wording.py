@@ -1,7 +1,6 @@
 """The wording that the tests of certificates expect: a rewording is entered here alone."""
 
 ARE_THE_SAME_FILE = "are the same file; name another"
-AS_PREDICTED_AFTER_ADJUSTMENT = "as predicted after adjustment"
 BALLS_ARE_TOO_MANY_AT_MOST = "796 balls are too many .* at most 666"
 CERTIFICATE_VALUES_OF_QUICKSTART = "# certificate values of quickstart, drawn with seed 1"
 CO_ORDINATES_OF_UNDETERMINED_IN_THESE = "co-ordinates of .*r3c2.* undetermined in these axes"

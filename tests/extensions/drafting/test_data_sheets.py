@@ -74,17 +74,6 @@ def test_values_that_are_missing(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert wording.LACKS_VALUES in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("option", ["--machine", "--example"])
-def test_an_example_takes_no_data_sheet(
-    option: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = tmp_path / "m.yaml"
-    assert main(["init", str(path), option, *options(BRIDGE)]) == 2
-    assert wording.NO_DATA_SHEET in capsys.readouterr().err
-    assert main(["init", str(path), option]) == 0
-    assert (path.read_bytes() == EXAMPLE.read_bytes()) == (option == "--example")
-
-
 def test_without_the_extension_the_example_is_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -106,7 +95,6 @@ def test_arguments_of_another_type() -> None:
         ("0.9 um + L/400", 0.9e-6, 2.5e-6),
         ("0.9 µm+L/400", 0.9e-6, 2.5e-6),
         ("(0.9 + L/400) um", 0.9e-6, 2.5e-6),
-        ("(0.9 + L/400) um with L in mm", 0.9e-6, 2.5e-6),
         ("E0,MPE = ±(1.7 + 3 L/1000) um", 1.7e-6, 3e-6),
         ("1.7 + 3L/1000 µm", 1.7e-6, 3e-6),
         ("0.5 um + L/1000000", 0.5e-6, 1e-6),
@@ -126,17 +114,6 @@ def test_forms_of_certificates_and_plates() -> None:
         assert expanded(text).standard == LengthFunction(0.2e-6, 0.25e-6), text
     for text in ("6x4 420 x 252 mm", "6 x 4 balls, pitch 84 mm", "6 × 4, pitch 8.4 cm"):
         assert plate(text).size == (0.42, 0.252), text
-
-
-def test_the_help_names_all(capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit):
-        main(["init", "--help"])
-    told = " ".join(capsys.readouterr().out.split())
-    for option in options(
-        dict.fromkeys((*BRIDGE, "tips", "repeatability", "temperature", "target", "hours"), "")
-    ):
-        assert option in told
-    assert "MB1: y carries x carries z" in told and "--example" in told
 
 
 pty = pytest.importorskip("pty", reason="there is no pseudo-terminal")

@@ -61,8 +61,14 @@ def test_the_printed_command_runs(
     assert main(["check", "m-chosen.yaml"]) == 0
 
 
-@pytest.mark.parametrize("tips", ["one", "star", "head"])
-@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
+@pytest.mark.parametrize(
+    ("arrangement", "tips"),
+    [
+        (one, tips)
+        for k, one in enumerate(ARRANGEMENTS)
+        for tips in ("star", ("one", "head")[k % 2])
+    ],
+)
 def test_every_arrangement_has_full_rank(arrangement: str, tips: str) -> None:
     text = drafted(BRIDGE, machine_type=arrangement, tips=tips)
     (experiment,) = load(Path("drafted.yaml"), text=text)

@@ -29,7 +29,7 @@ PROBES = {"x": ["right", "left"], "y": ["back", "front"], "z": ["down"]}
 IN_PLANE = {"x": "yz", "y": "zx", "z": "xy"}
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("name", SHAPES)
 def test_the_start_is_near_a_plan_of_its_size(name: str) -> None:
     drafted = bp.design(**BRIDGE | SHAPES[name])

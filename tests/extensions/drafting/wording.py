@@ -9,7 +9,7 @@ FOUR_LENGTHS = '"900 1200 700 500 mm" has 4 lengths, not 3; write for example "9
 NO_UNIT_OF_VOLUME = '"900" has no unit'
 NOTHING_HIGH = '"0 mm" must be above zero'
 NO_UNIT_OF_MPE = '"0.9" has no unit'
-STEEP = "grows by 1 mm per metre of length"
+STEEP = "grows by 1000 um/m"
 DIVIDES_BY_ZERO = "divides by zero"
 NO_COVERAGE_FACTOR = '"0.4 um + 0.5 um/m" needs one coverage factor of 1 to 10; write "…, k=2"'
 SMALL_COVERAGE_FACTOR = '"0.4 um, k=0.5" needs one coverage factor of 1 to 10'
@@ -45,7 +45,6 @@ LACKS_VALUES = (
     'the data sheet lacks values; add for example --volume "900 1200 700 mm" --plate'
     ' "6 x 6, 420 mm"'
 )
-NO_DATA_SHEET = "--machine and --example take no data sheet; give only one of them"
 NO_ANSWER = "no answer for --machine-type; nothing is written"
 HALF_THE_MPE = "lengths of the corrected machine: half the MPE."
 TIPS_IN_TWO_DIMENSIONS = "tips star are not for a volume of two lengths"

@@ -1,4 +1,4 @@
-"""Simulated campaigns on machines of ten kinds, whose numbers of coefficients are known."""
+"""Simulated campaigns on machines of six kinds, whose numbers of coefficients are known."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ import ballplate as bp
 import numpy as np
 from ballplate.extensions.judgement.rungs import (
     LadderModel,
-    chain_of,
     empirical_rung,
     kinematic_rung,
     with_model,
@@ -18,6 +17,7 @@ from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.machines.kinematic import KinematicModel
 from ballplate.simulator.machines.protocol import ErrorModel
 from ballplate.simulator.readings.generate import noisy_certificate, noisy_readings
 from ballplate.simulator.readings.observed_readings import ObservedReadings, observe
@@ -25,19 +25,8 @@ from numpy.typing import NDArray
 
 Real = NDArray[np.float64]
 
-# Positional and rotational coefficients, and those of a single function.
-KINDS: tuple[tuple[int, int, dict[str, int]] | int, ...] = (
-    (2, 1, {}),
-    (2, 2, {}),
-    (3, 2, {}),
-    (3, 3, {}),
-    (4, 3, {}),
-    (5, 5, {}),
-    (3, 3, {"EXX": 6}),
-    (4, 2, {"EBZ": 5}),
-    (2, 1, {"EYX": 5}),
-    3,
-)
+# Positional and rotational coefficients, or those of an empirical model.
+KINDS: tuple[tuple[int, int] | int, ...] = ((2, 1), (2, 2), (3, 3), (4, 4), (5, 5), 3)
 
 
 @lru_cache
@@ -66,9 +55,9 @@ def uncertainties(kind: int) -> Real:
 
 def last_ones(model: LadderModel) -> Real:
     """Which coefficients are the last of a function; of an empirical model all."""
-    if model.numbers is None:
+    chain, last = model.model, np.zeros(model.count, bool)
+    if not isinstance(chain, KinematicModel):
         return np.ones(model.count, bool)
-    chain, last = chain_of(model.model), np.zeros(model.count, bool)
     last[[own.stop - 1 for own in chain.slices.values() if own.stop > own.start]] = True
     return last
 

@@ -21,14 +21,12 @@ from ballplate.simulator.estimation.gauss_newton import estimate
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
-from numpy.typing import NDArray
 
 from tests.extensions.judgement import wording
 from tests.reference import dense
 from tests.reference.small_quickstart import small_sections
 
 TOP = Path(__file__).parents[3]
-Real = NDArray[np.float64]
 
 
 def small(**changed: Any) -> Experiment:
@@ -289,18 +287,3 @@ def test_sources_stand_in_the_order_of_what_they_contribute() -> None:
         assert found.lines()[1].endswith(wording.SOURCES_BY_THEIR_PART)
         shown = [line.split("  ")[0].strip() for line in found.lines()[4 : 4 + len(parts)]]
         assert shown == list(found.sources)
-
-
-def test_usage_shows_readings_in_brackets_where_they_may_be_left_out(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    for command, ending in (
-        ("run --budget", "FILE [READINGS ...]"),
-        ("next", "FILE [READINGS ...]"),
-        ("fit", "FILE [READINGS ...]"),
-        ("import", "REPORT [REPORT ...]"),
-    ):
-        with pytest.raises(SystemExit):
-            main([command, "--help"])
-        usage = capsys.readouterr().out.partition("\n\n")[0]
-        assert usage.endswith(ending), command

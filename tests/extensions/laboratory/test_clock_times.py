@@ -8,10 +8,10 @@ import ballplate as bp
 import numpy as np
 import pandas as pd
 import pytest
-from ballplate.extensions.laboratory.clock_times import ClockError, clock_time
+from ballplate.extensions.laboratory.clock_times import clock_time
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.inputs.messages import ExperimentError, Message
-from ballplate.simulator.inputs.quantities import DURATION_UNITS
+from ballplate.simulator.inputs.quantities import DURATION_UNITS, QuantityError
 from ballplate.simulator.inputs.yamltree import GivenText
 from ballplate.simulator.readings.reading_sources import source_rows
 
@@ -41,7 +41,7 @@ def times(experiment: bp.Experiment, *tables: pd.DataFrame) -> np.ndarray:
     settings = experiment.readings
     units = {"time": DURATION_UNITS}
     wrong: list[Message] = []
-    rows = source_rows(sources, design, settings, wrong, lambda x: True, units).rows
+    rows = source_rows(sources, design, settings, wrong, units).rows
     assert not wrong
     seconds = np.array([row.lengths[-1] for row in rows])
     return np.asarray(seconds - seconds.mean())
@@ -128,5 +128,5 @@ def test_without_a_drift_times_are_not_used(table: pd.DataFrame) -> None:
     "text", ["", "25:00", "10:60", "10:05:60", "2026-02-30T10:00", "11/22/2026 10:05", "10", "x:y"]
 )
 def test_what_is_no_time_is_refused(text: str) -> None:
-    with pytest.raises(ClockError, match=wording.IS_NO_TIME):
+    with pytest.raises(QuantityError, match=wording.IS_NO_TIME):
         clock_time(text)

@@ -189,7 +189,7 @@ def test_points_of_one_name_and_their_numbers_are_those_of_a_ball(tmp_path: Path
     )
     path.write_text(f"UNITS/MM\n{points}\nENDFIL\n", encoding="utf-8")
     found = bp.read_report(path, QUICKSTART)
-    (one,) = found.imported.readings
+    (one,) = found.readings
     assert [round(1e3 * value, 6) for value in one.centre] == [100, 200, 300]
     told = found.told
     assert told[0].endswith("taken: 1 sphere centre; left: nothing")

@@ -13,6 +13,7 @@ import pytest
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.inputs.yamltree import GivenText
 from ballplate.simulator.readings.reading_files import ObservedReadings, read_readings
 
 from tests.extensions.laboratory import wording
@@ -94,3 +95,30 @@ def test_a_heading_that_occurs_twice_is_named_with_its_line(
         tmp_path / "t.csv",
     )
     assert wording.THE_HEADING_OCCURS_MORE_THAN_ONCE in more
+
+
+def test_columns_that_influences_ask_for_are_read_in_any_table(
+    readings: pandas.DataFrame,
+) -> None:
+    """Temperatures of a table with semicolons are those of the plain file."""
+    (experiment,) = load(DESIGN)
+    influence = {
+        "kind": "temperature",
+        "artefact_expansion": {"value": "11.5 um/m/K", "standard_uncertainty": "1 um/m/K"},
+        "artefact_temperature": {"value": "20 degC", "standard_uncertainty": "0.1 K"},
+    }
+    design = lay_out(experiment.with_(influences=[influence]))
+    warm = 20.0 + 0.01 * np.arange(len(readings))
+    plain = readings.assign(temperature_artefact_degC=warm).to_csv(index=False)
+    other = readings.rename(columns={"ball": "Kugel", "x_mm": "X [mm]", "y_mm": "Y [mm]"})
+    other = other.assign(**{"Temperature artefact [°C]": warm}).iloc[:, [2, 6, 0, 1, 5, 4, 3]]
+    text = other.to_csv(index=False, sep=";", decimal=",")
+    one, two = (read_readings(GivenText("t.csv", given), design) for given in (plain, text))
+    assert "t.csv: read as: semicolons, decimal commas" in two.table_notes[0]
+    for found in (one, two):
+        assert found.design.readings.beside is not None
+        given = found.design.readings.beside["temperature_artefact"]
+        np.testing.assert_allclose(given, warm, rtol=0, atol=1e-12)
+        np.testing.assert_array_equal(
+            found.design.readings.beside["order"], np.arange(len(readings))
+        )

@@ -164,13 +164,13 @@ FA(A_4)=FEAT/SPHERE,OUTER,CART,1,2,3,4"""
     read = bp.read_report(tmp_path / "report")
     assert wording.CENTRES_ARE_IN_A_PARTS_CO in read.remarks[-2]
     assert read.remarks[-1].startswith(wording.CENTRES_IN_THE_MACHINES)
-    assert "coordinates: ball centres" in read.imported.key
+    assert "coordinates: ball centres" in read.key
 
 
 def test_a_part_system_throughout_is_told_as_the_key_to_state(tmp_path: Path) -> None:
     lines = "D(PART)=DATSET/DAT(A),ZDIR\nFA(P_1)=FEAT/SPHERE,OUTER,CART,1,2,3,4"
     (tmp_path / "report").write_text(DMIS.format(units="MM", lines=lines), encoding="utf-8")
-    assert "readings: {coordinates: part}" in bp.read_report(tmp_path / "report").imported.key
+    assert "readings: {coordinates: part}" in bp.read_report(tmp_path / "report").key
 
 
 POINTS = [(0, 0, 11), (11, 0, 0), (-11, 0, 0), (0, 11, 0), (0, -11, 0), (6.6, 8.8, 0)]
@@ -186,7 +186,7 @@ def test_points_that_were_measured_make_a_sphere(tmp_path: Path, word: str) -> N
     sphere = "F(P_1)=FEAT/SPHERE,OUTER,CART,100.1,200.1,300.1,22\n"
     text = DMIS.format(units="MM", lines=sphere + lines_of_points(6, word))
     (tmp_path / "report").write_text(text, encoding="utf-8")
-    (one,) = bp.read_report(tmp_path / "report").imported.readings
+    (one,) = bp.read_report(tmp_path / "report").readings
     np.testing.assert_allclose(one.centre, (0.1, 0.2, 0.3), atol=1e-12)
     assert one.uncertainty is not None and one.uncertainty < 1e-12
 
@@ -218,7 +218,7 @@ def test_what_is_printed_twice_is_taken_once_and_measured_twice_twice(tmp_path: 
     )
     (tmp_path / "report").write_text(DMIS.format(units="MM", lines=lines), encoding="utf-8")
     found = bp.read_report(tmp_path / "report")
-    assert len(found.imported.readings) == 2
+    assert len(found.readings) == 2
     assert "left: 1 sphere (printed again)" in found.told[0]
 
 
@@ -247,7 +247,7 @@ def test_units_that_are_not_stated_have_to_be_given(tmp_path: Path) -> None:
     text = "FILNAM/'A'\nFA(P_1)=FEAT/SPHERE,OUTER,CART,1,2,3,4\nENDFIL\n"
     told = "no UNITS/ before the first feature; state the unit with --unit mm or --unit in"
     assert refusal(tmp_path, text) == f"report:2:1: {told}"
-    (one,) = bp.read_report(tmp_path / "report", unit="in").imported.readings
+    (one,) = bp.read_report(tmp_path / "report", unit="in").readings
     np.testing.assert_allclose(one.centre, (0.0254, 0.0508, 0.0762))
     stated = makers.dmis(BALLS)
     (tmp_path / "report").write_text(stated, encoding="utf-8")
@@ -302,7 +302,7 @@ def test_circles_of_every_format(tmp_path: Path) -> None:
     )
     for text in texts:
         (tmp_path / "report").write_text(text, encoding="utf-8")
-        (one,) = bp.read_report(tmp_path / "report", circles=True).imported.readings
+        (one,) = bp.read_report(tmp_path / "report", circles=True).readings
         assert one.centre == (0.001, 0.002, 0.003)
         assert "circle" in refusal(tmp_path, text)
 
@@ -357,7 +357,7 @@ def test_points_of_qif_2_stand_below_their_sphere(tmp_path: Path) -> None:
         f'<PointList n="6">{points}</PointList>',
     )
     (tmp_path / "report").write_text(text, encoding="utf-8")
-    (one,) = bp.read_report(tmp_path / "report").imported.readings
+    (one,) = bp.read_report(tmp_path / "report").readings
     np.testing.assert_allclose(one.centre, (0.1, 0.2, 0.3), atol=1e-12)
 
 
@@ -375,13 +375,9 @@ def test_documents_that_are_no_results_of_qif_are_refused(tmp_path: Path) -> Non
     assert 'unknown unit "furlong"' in refusal(tmp_path, other)
 
 
-@pytest.mark.parametrize("separator", [",", ";", "\t"])
-def test_tables_need_no_import(tmp_path: Path, separator: str) -> None:
-    rows = "# of today\nposition,ball,x_mm,y_mm,z_mm\nP1,r1c1,1.5,2.5,3.5\n"
-    assert refusal(tmp_path, rows.replace(",", separator)) == (wording.THIS_IS_A)
-
-
-@pytest.mark.parametrize("text", ["", "\n" * 1000, "a,b,c\n1,2,3\n", "Lorem ipsum\n", "{}", "<a/>"])
+@pytest.mark.parametrize(
+    "text", ["", "\n" * 1000, "a,b,c,d\ne,1,2,3\n", "Lorem ipsum\n", "{}", "<a/>"]
+)
 def test_files_of_no_format_are_refused_with_the_formats_that_there_are(
     tmp_path: Path, text: str
 ) -> None:

@@ -120,14 +120,6 @@ def test_another_plate_is_as_stated(tmp_path: Path) -> None:
     assert "all positions fit a large 2.00 times as large" in refusal(tmp_path, true, table)
 
 
-def test_units_are_told_as_units(tmp_path: Path) -> None:
-    true = tree((3, 3), (200, 200), ["p"])
-    table = read(tmp_path, true)
-    table[["x_mm", "y_mm", "z_mm"]] = table[["x_mm", "y_mm", "z_mm"]] / 10.0
-    text = refusal(tmp_path, true, table)
-    assert "centimetres that are read as millimetres" in text and "as large" not in text
-
-
 def test_other_gross_errors_are_told_as_before(tmp_path: Path) -> None:
     true = tree((3, 3), (200, 200), ["p", "q"])
     table = read(tmp_path, true)

@@ -44,4 +44,4 @@ def test_a_report_of_the_program_has_the_planned_readings(program: Path) -> None
     keys = ["position", "ball", "probe"]
     read = found.to_frame()
     assert set(read[keys].itertuples(index=False)) == set(planned[keys].itertuples(index=False))
-    assert len(read) == len(planned) and "coordinates: ball centres" in found.imported.key
+    assert len(read) == len(planned) and "coordinates: ball centres" in found.key

@@ -7,10 +7,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import ballplate as bp
-import numpy as np
 import pandas as pd
 import pytest
-from ballplate.extensions.laboratory.digits import doubts_about_units
 from ballplate.extensions.laboratory.reading_tables import any_table_rows
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
@@ -49,7 +47,6 @@ def uncertainties(
         names,
         settings,
         [],
-        lambda x: bool(np.isfinite(x).all()),
         3,
         {},
     )
@@ -148,7 +145,6 @@ def test_an_uncertainty_of_all_rows_is_that_of_a_column() -> None:
         ({"u": "=0 um"}, 'readings.columns.u: "0 um" must be above zero'),
         ({"u": "=-1 um"}, "readings.columns.u: .* must be above zero"),
         ({"ball": "=r1c1"}, "readings.columns.ball: a ball is that of a reading"),
-        ({"diameter": "=22 mm"}, "readings.columns.diameter: a diameter is that of a reading"),
     ],
 )
 def test_what_cannot_be_of_all_rows_is_refused(columns: dict[str, str], text: str) -> None:
@@ -162,21 +158,3 @@ def test_an_uncertainty_without_a_unit_is_not_taken_for_one_in_that_of_co_ordina
     for heads, cells in (("u", "0.2"), ("standard uncertainty", "0.0002"), ("u,D_mm", "0.2,20")):
         with pytest.raises(ExperimentError, match="has no unit"):
             uncertainties(experiment, heads, cells)
-
-
-@pytest.mark.parametrize(
-    ("u", "is_odd"), [(2e-4, True), (2e-6, False), (5e-8, False), (1e-9, True)]
-)
-def test_uncertainties_that_are_rather_in_another_unit_are_warned_of(
-    experiment: Experiment, u: float, is_odd: bool
-) -> None:
-    """Millimetres for micrometres and the like; the repeatability is 0.2 um."""
-    doubts = doubts_about_units(lay_out(experiment), np.full(20, u))
-    assert [("check the unit" in one) for one in doubts] == [True] * is_odd
-
-
-def test_a_fit_warns_of_uncertainties_in_another_unit(experiment: Experiment) -> None:
-    table = bp.simulate(experiment).assign(u=0.2)
-    fitted = bp.fit(experiment, table.rename(columns={"u": "u_mm"}))
-    (warning,) = [one for one in fitted.warnings if "check the unit" in one]
-    assert "200 µm" in warning or "0.2 mm" in warning

@@ -3,8 +3,6 @@
 ARE_NOT_AMONG_THE_POINTS = '"2 7" are not among the 6 points of the set'
 ARE_NOT_IN_THE_EXPERIMENT = "are not in the experiment"
 ARE_SAID_TO_BE_IN = 'lengths of "X'
-AS_BALL_CENTRES = "as ball centres, but only to 50 mm as scale readings, the default"
-AS_SCALE_READINGS = "as scale readings, but only to 50 mm as ball centres, which is stated"
 A_DOCUMENT_TYPE_DOCTYPE = (
     "a document type (<!DOCTYPE …>) is not read, nor any entity of it; remove it"
 )
@@ -20,12 +18,10 @@ COLUMNS_FOUND_MISSING = (
 )
 COLUMNS_INSTEAD_OF = "9 columns instead of 6"
 CORRECT_THE_NAMES_OF_THE_BALLS = "correct the names of the balls"
-CORRECT_THE_SIGNS_OF_THE_OFFSETS = "correct the signs of the offsets"
 COULD_ALL_BE = "could all be x; say which"
 CO_ORDINATES_ARE_TAKEN_FOR_BALL = "co-ordinates are interpreted as ball centres, as in reports"
 CO_ORDINATES_WHICH_IS_NO_MULTIPLE = "19 co-ordinates, which is no multiple of 3"
 DATES_WITHOUT_A = "dates without a zone, and others are times of a day"
-DECIMAL_COMMA_IF = "--decimal comma if it is 612.345, --decimal point if it is 612345"
 DIMENSION_FLATNESS_OF_PLANE = "left: 1 dimension (flatness of plane), 1 sphere (no row Z)"
 DIMENSION_POSITION_OF_SPHERE = "1 dimension (position of sphere), 1 dimension (location of plane)"
 DIVIDED_BY_ITS_COVERAGE_FACTOR = "divided by its coverage factor"
@@ -54,16 +50,15 @@ MISSING_BALL_AND_AXES = (
     'columns found: "A", "B", "C"; missing: ball, x, y, z (and position, probe, unless stated'
 )
 MISSING_BALL_AND_POSITION = "missing: ball (and position, unless stated elsewhere)"
-MM_IN_THE_MIDDLE = "22 mm in the middle"
 MORE_THAN_ELEMENTS = "f:1:12: more than 3 elements; leave some out"
 NOTHING_IS_FILLED = "x, y, z are empty in all"
 NOR_ONE_ABOVE_IT = 'merged-en.csv:2:1: no "Position", nor one above it'
 NOT_RECOGNISED_AS_QIF_RESULTS = (
     "report: not recognised as QIF results, DMIS output, PC-DMIS report, Calypso table; "
-    "state its format with --from (qif, dmis, pcdmis, calypso)"
+    "state its format with --from (qif, dmis, pcdmis, calypso); a table needs no import: "
+    "ballplate fit reads it"
 )
 NO_CLOCK_TIMES = "no clock times, which 0.csv has"
-NO_DIGIT_BELOW = "no digit below 1 µm"
 NO_MEASUREMENT_RESULTS = "no measurement results; is it a plan, or a model?"
 NO_NAMES_OF_THE_EXPERIMENT = (
     "f: no names of the experiment in KUGEL A, KUGEL B; its positions are z low, z high, "
@@ -88,14 +83,10 @@ NO_UNIT_IS_STATED_FOR_THE_ISTWERT = (
 )
 NOR_NUMBERS_THAT_FIT = "nor numbers in reading order that fit; write the names"
 NO_WRITE_A = "lab.csv:6:1: no x; write a number, or remove the line"
-OTHERWISE_THE_NAMES_OF_BALLS = "otherwise correct the names of balls"
 NO_Y_WRITE = "2:1: no y; write a number"
 PLACED_BY_THE_NOMINAL_POSES = "placed by the nominal poses"
 PLANNED_BUT_NOT_READ = "planned but not read (3)"
 PLANNED_BUT_NOT_READ_2 = "planned but not read"
-POSITIONS_AND_HAVE_THE_SAME_READINGS = (
-    'positions "z low" and "z high" have the same readings to the last digit'
-)
 POSITIONS_MATCHED_BY_NAME_BUT = "positions matched by name, ignoring case and signs: "
 POSITIONS_MATCHED_BY_NUMBER = "positions matched by number and location"
 POSITION_ABOVE_THE_HEADINGS = 'position "z low" above the headings'
@@ -136,11 +127,9 @@ THE_PROBES_ARE_NOT_IN_THE_EXPERIMENT = (
     'the probes "T1", "T2", "T3", "T4", "T5" are not in the experiment, and neither the plan nor'
 )
 THE_SHEETS_HAVE_TABLES = 'the sheets "Monday", "Tuesday" have tables; give --sheet'
-THIS_IS_A = "report: this is a table, which needs no import; ballplate fit reads it"
 THIS_IS_A_DMIS = "this is a DMIS program, not a report"
 THIS_IS_A_REPORT = "this is a report of a measuring program (DMIS output), and no table"
 TOO_FEW_BALLS_WERE_READ = "too few balls were read in z high"
-TO_THE_LAST_DIGIT = "to the last digit"
 WORKBOOKS_NEED_OPENPYXL = (
     "workbooks need openpyxl; install it with: python -m pip install 'ballplate[xlsx]'"
 )

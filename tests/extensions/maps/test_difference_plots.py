@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import ballplate as bp
 import numpy as np
 import pytest
-from ballplate.extensions.maps.comparison import ComparisonSettings, MapComparison, compared
+from ballplate.extensions.maps.comparison import MapComparison, compared
 from ballplate.extensions.maps.difference_plots import draw_difference
 from ballplate.simulator.machines.protocol import Array
 
@@ -20,7 +20,7 @@ pytest.importorskip("matplotlib", reason="pictures need matplotlib")
 @pytest.fixture(scope="module")
 def found() -> MapComparison:
     maps = [simulated_map(bp.quickstart(), seed) for seed in (1, 2)]
-    return compared(maps[0], maps[1], ComparisonSettings(grid=3))
+    return compared(maps[0], maps[1], grid=3)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.extensions.maps.compared_maps import ComparedMap, map_of_fit, motions
-from ballplate.extensions.maps.comparison import ComparisonSettings, compared
+from ballplate.extensions.maps.comparison import compared
 from ballplate.results.fits import Fit
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.geometry.motions import cross_matrices
@@ -78,8 +78,8 @@ def in_other_frame(fit: Fit) -> ComparedMap:
 
 def test_another_frame_changes_the_motion_alone(fits: tuple[Fit, Fit]) -> None:
     first, second = (map_of_fit(fit) for fit in fits)
-    usual = compared(first, second, ComparisonSettings())
-    other = compared(first, in_other_frame(fits[1]), ComparisonSettings())
+    usual = compared(first, second)
+    other = compared(first, in_other_frame(fits[1]))
     u = usual.places.standard_uncertainties
     assert np.abs(other.places.standard_uncertainties / u - 1.0).max() < 1e-4
     assert np.abs(other.places.differences - usual.places.differences).max() < 1e-3 * u.max()
@@ -108,7 +108,7 @@ def test_a_map_moved_as_a_whole_differs_by_that_motion(fits: tuple[Fit, Fit]) ->
         undetermined=np.zeros((len(first.values) + 6, 0)),
         shared=np.zeros((len(first.values) + 6, 0)),
     )
-    found = compared(first, second, ComparisonSettings())
+    found = compared(first, second)
     assert found.places.exceeding == 0
     assert np.abs(found.places.differences).max() < 1e-14
     assert np.abs(found.lengths[-1].differences).max() < 1e-14
@@ -143,7 +143,7 @@ def dense_lengths(fit: Fit, points: Array, pairs: Array) -> tuple[Array, Array]:
 
 
 def test_lengths_are_those_of_the_corrected_points(fits: tuple[Fit, Fit]) -> None:
-    comparison = compared(map_of_fit(fits[0]), map_of_fit(fits[1]), ComparisonSettings(grid=3))
+    comparison = compared(map_of_fit(fits[0]), map_of_fit(fits[1]), grid=3)
     points, found = comparison.points, comparison.lengths[-1]
     pairs = np.array(list(combinations(range(27), 2)))
     (first, one), (second, other) = (dense_lengths(fit, points, pairs) for fit in fits)
@@ -158,17 +158,17 @@ def test_the_joint_test_is_that_of_the_parameters(fits: tuple[Fit, Fit]) -> None
     first, second = (fit.covariance("machine").to_numpy() for fit in fits)
     apart = np.subtract(*(fit.functions.choose(["machine"]).values for fit in fits))
     expected = float(apart @ np.linalg.solve(first + second, apart))
-    test = compared(map_of_fit(fits[0]), map_of_fit(fits[1]), ComparisonSettings()).test
+    test = compared(map_of_fit(fits[0]), map_of_fit(fits[1])).test
     assert test is not None and test.dimensions == len(apart)
     assert test.statistic == pytest.approx(expected, rel=1e-6)
 
 
 def test_functions_are_compared_by_their_coefficients(fits: tuple[Fit, Fit]) -> None:
-    found = compared(map_of_fit(fits[0]), map_of_fit(fits[1]), ComparisonSettings())
-    names = [one.name for one in found.functions]
+    found = compared(map_of_fit(fits[0]), map_of_fit(fits[1]))
+    names = [one.kind for one in found.functions]
     assert names[:3] == ["EXX", "EYX", "EZX"] and len(names) == 18
     for name in ("EXX", "EYX", "ECZ"):
-        one = next(one for one in found.functions if one.name == name)
+        one = next(one for one in found.functions if one.kind == name)
         own = [k for k, p in enumerate(fits[0].design.model.parameters) if p.function == name]
         covariance = sum(fit.covariance("machine").to_numpy()[np.ix_(own, own)] for fit in fits)
         apart = np.subtract(*(fit.functions.choose(["machine"]).values[own] for fit in fits))
@@ -176,5 +176,5 @@ def test_functions_are_compared_by_their_coefficients(fits: tuple[Fit, Fit]) -> 
         expected = float(apart @ np.linalg.solve(covariance, apart))
         assert one.test.statistic == pytest.approx(expected, rel=1e-6)
     # EYX is zero at both ends, where there is nothing to compare.
-    straight = next(one for one in found.functions if one.name == "EYX").figures
+    straight = next(one for one in found.functions if one.kind == "EYX")
     assert straight.count == 9 and np.isnan(straight.normalised[-1])

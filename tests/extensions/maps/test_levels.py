@@ -16,7 +16,7 @@ from ballplate.extensions.maps.campaign_tests import (
     single_chances,
 )
 from ballplate.extensions.maps.compared_maps import MappedValues, motions
-from ballplate.extensions.maps.comparison import ComparisonSettings, compared
+from ballplate.extensions.maps.comparison import compared
 from ballplate.extensions.maps.normalised_errors import ValueDifference
 from ballplate.extensions.maps.shared_certificates import with_shared_certificates
 from ballplate.simulator.experiment.model import Experiment
@@ -113,10 +113,7 @@ def test_what_a_shared_certificate_fixes_is_not_counted() -> None:
     """The machine's scale is free, so that the plate's size rests on the certificate alone."""
     maps = [simulated_map(small(), 100 + k, 7) for k in range(2)]
     shared = with_shared_certificates(maps[0], maps[1])[:2]
-    apart, together = (
-        compared(one, other, ComparisonSettings(grid=2)).plates[0].test
-        for one, other in (maps, shared)
-    )
+    apart, together = (compared(one, other, grid=2).plates[0].test for one, other in (maps, shared))
     assert apart is not None and (apart.dimensions, apart.fixed) == (6, 0)
     assert together is not None and (together.dimensions, together.fixed) == (5, 1)
     assert together.held < 1e-12
@@ -172,20 +169,3 @@ def test_one_pair_in_twenty_is_changed_by_chance(
             f" {count}, {above / count:.2%} ({low:.2%} to {high:.2%})"
         )
     assert 0.04 <= above / count <= 0.06
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("is_shared", [False, True])
-def test_simulated_campaigns_are_as_linear_ones(is_shared: bool) -> None:
-    """All the way from readings: p of the map and of the plate are uniform in their mean."""
-    found = []
-    for k in range(60):
-        maps = [
-            simulated_map(small(u), 900 + 2 * k + i, 5000 + k if is_shared else None)
-            for i, u in enumerate(("0.2 um", "0.4 um"))
-        ]
-        if is_shared:
-            maps = list(with_shared_certificates(maps[0], maps[1])[:2])
-        comparison = compared(maps[0], maps[1], ComparisonSettings(grid=2))
-        found.append([comparison.test.p, comparison.plates[0].test.p])  # type: ignore[union-attr]
-    assert np.abs(np.mean(found, axis=0) - 0.5).max() < 3.5 / np.sqrt(12 * len(found))

@@ -133,15 +133,14 @@ def test_curves_of_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str
     path = str(written(tmp_path))
     assert main(["map", path, "--curves"]) == 0
     out = capsys.readouterr().out
-    assert "random: one standard deviation, at each position separately" in out
-    assert "largest random" in out and "expanded" not in out and " U" not in out
+    assert "U: one standard deviation (k = 1) of the random parts" in out
     assert (
         main(["map", path, "--curves", "--error", "EXX", "--points", "3", "--format", "csv"]) == 0
     )
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == "error,line,position_mm,value,random,k,unit"
+    assert lines[0] == "error,line,position_mm,value,U,k,unit"
     assert lines[2].split(",")[:5] == ["EXX", "", "450", "3.5", "2"]
     assert main(["map", path, "--curves", "--json"]) == 0
     (data,) = [json.loads(capsys.readouterr().out)]
-    assert data["machine"] == "moving bridge"
-    assert data["functions"][0]["random"] == pytest.approx([2e-6] * 41)
+    assert data["title"] == "moving bridge" and data["coverage_factor"] == 1.0
+    assert data["functions"][0]["expanded_uncertainty"] == pytest.approx([2e-6] * 41)

@@ -8,10 +8,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from ballplate.extensions.campaign.campaign_picture import draw_campaign, words
-from ballplate.planning.choice import CurvePoint, Gain
+from ballplate.extensions.campaign.campaign_picture import draw_curve
 from ballplate.planning.constraints import Budget, Spent
-from ballplate.planning.selection import Campaign
+from ballplate.planning.schedule import run_sheet
+from ballplate.planning.selection import Campaign, CurvePoint, Gain
 from ballplate.results.checked_designs import predict
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.pool import with_chosen
@@ -38,7 +38,8 @@ def found() -> Campaign:
     )
     return Campaign(
         experiment, pool, "U6", "m", 0, Budget(4 * 3600.0), chosen, (), Spent(14000.0, 175, 5), 6e-7, 4e-7, 1.2e-6,
-        "as drawn", Spent(4440.0, 75, 2), 5.7e-6, gains, left_out, predict(with_chosen(experiment, chosen)), curve,
+        "as drawn", Spent(4440.0, 75, 2), 5.7e-6, gains, left_out, predict(with_chosen(experiment, chosen)),
+        run_sheet(chosen, pool.changes), curve,
     )  # fmt: skip
 
 
@@ -47,49 +48,32 @@ def texts(campaign: Campaign, folder: Path) -> list[str]:
     outlines.
     """
     path = folder / "picture.svg"
-    draw_campaign(campaign, path)
+    draw_curve(campaign, path)
     return re.findall(r"<!-- (.*?) -->", path.read_text(encoding="utf-8"))
 
 
-def test_a_picture_with_a_curve_has_marks_and_positions(found: Campaign, tmp_path: Path) -> None:
+def test_a_picture_with_a_curve_has_all_that_is_compared(found: Campaign, tmp_path: Path) -> None:
     drawn = texts(found, tmp_path)
     for text in (
         "best choice found",
         "bound of any choice",
-        "chosen: 0.600",
-        "as drawn: 1.20",
+        "as drawn",
+        "target",
         "hours allowed",
     ):
         assert text in drawn
-    # Five times what is drawn is further off than the axis goes.
-    assert "target: 5.70 (above)" in drawn
-    # Every position has its number in the volume.
-    for number in range(1, 6):
-        assert str(number) in drawn
 
 
-def test_without_a_curve_marks_stand_alone(found: Campaign, tmp_path: Path) -> None:
-    drawn = texts(replace(found, curve=()), tmp_path)
-    values = "chosen: 0.600; bound of any choice: 0.400; as drawn: 1.20; target: 5.70"
-    assert values in drawn and "hours allowed" not in drawn
+def test_without_a_curve_the_positions_are_drawn(found: Campaign, tmp_path: Path) -> None:
+    replace(found, curve=()).plot(tmp_path / "picture.svg")
+    text = (tmp_path / "picture.svg").read_text(encoding="utf-8")
+    found.prediction.plot(tmp_path / "design.svg")
+    assert text == (tmp_path / "design.svg").read_text(encoding="utf-8")
 
 
-def test_the_same_campaign_gives_the_same_bytes(found: Campaign, tmp_path: Path) -> None:
-    draw_campaign(found, tmp_path / "one.svg")
-    draw_campaign(found, tmp_path / "two.svg")
-    assert (tmp_path / "one.svg").read_bytes() == (tmp_path / "two.svg").read_bytes()
-
-
-@pytest.mark.parametrize("curve", [True, False], ids=["curve", "no curve"])
-def test_what_is_undetermined_or_has_no_bound_is_drawn_as_such(
-    found: Campaign, tmp_path: Path, curve: bool
-) -> None:
-    nothing = replace(found, value=math.inf, bound=math.nan, drawn=math.inf)
-    nothing = nothing if curve else replace(nothing, curve=())
-    drawn = texts(nothing, tmp_path)
-    assert any(text.startswith("chosen: deficient") for text in drawn)
-    assert "deficient" in words(nothing) and "bound" not in words(nothing)
-    bare = replace(nothing, drawn=None, drawn_spent=None, target=None)
+def test_what_is_undetermined_or_missing_is_not_drawn(found: Campaign, tmp_path: Path) -> None:
+    assert "as drawn" not in texts(replace(found, drawn=math.inf), tmp_path)
+    bare = replace(found, drawn=None, drawn_spent=None, target=None)
     assert not {"as drawn", "target"} & set(texts(bare, tmp_path))
 
 
@@ -107,16 +91,4 @@ def test_a_ratio_has_no_unit(found: Campaign, tmp_path: Path) -> None:
         ratio, curve=tuple(replace(point, value=1e3, bound=math.nan) for point in ratio.curve)
     )
     drawn = texts(ratio, tmp_path)
-    assert "chosen: 310" in drawn and not any("µm" in text for text in drawn)
-    assert "chosen 310, as drawn 900" in words(ratio)
-
-
-def test_a_budget_of_positions_is_counted(found: Campaign, tmp_path: Path) -> None:
-    curve = tuple(
-        replace(point, budget=Budget(positions=k)) for k, point in enumerate(found.curve, 2)
-    )
-    drawn = texts(replace(found, budget=Budget(positions=4), curve=curve), tmp_path)
-    assert "positions allowed" in drawn
-    assert not any(
-        re.fullmatch(r"\d\.5", text) for text in drawn[: drawn.index("positions allowed")]
-    )
+    assert "best choice found" in drawn and not any("µm" in text for text in drawn)

@@ -44,7 +44,7 @@ def test_page_opens_alone(plate_sizes_page: Path, tmp_path: Path) -> None:
             tab.open(plate_sizes_page)
             assert tab.value(OUTSIDE) == [] and tab.value(CUT) == []
         assert tab.value("document.title") == wording.SIZE_OF_THE_PLATE_AND_NUMBER
-        assert tab.value("document.querySelectorAll('figure').length") == 13
+        assert tab.value("document.querySelectorAll('figure').length") == 2
         assert (
             tab.value("getComputedStyle(document.querySelector('svg.chart path.line')).stroke")
             != "none"

@@ -1,6 +1,5 @@
 """The wording that the tests of pages expect: a rewording is entered here alone."""
 
-APPLY_TO_SWEEPS_ONLY = "apply to sweeps only"
 BY_THE_FULL_ESTIMATOR_AND_REVERSAL = "by the full estimator and reversal only"
 CAMPAIGN_OF_QUICKSTART = "<Campaign of quickstart: 7 of "
 NEITHER_AN_EXPERIMENT_NOR_THE_PATH = "neither an experiment nor the path"

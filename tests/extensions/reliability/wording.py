@@ -12,12 +12,8 @@ OFFSET_OF_PROBE_DOWN = "harmless: offset x of probe down"
 OFFSET_OF_PROBE_DOWN_IT_CHANGES = (
     "offset y of probe down; it changes distances between points of tasks' probes"
 )
-OR_THE_ARTEFACT_MOVED_IN_POSITION = (
-    "; or the artefact moved in position near between the probes: read it again"
-)
 SCALE_OF_THE_CERTIFICATE_OF_PLATE = "scale of the certificate of plate"
 SCATTER_OF_THE_READINGS_IN_POSITION = "scatter of the readings in position x high"
 SEE_WHAT_IS_SUSPECTED = "see what is suspected"
 THE_ARRANGEMENT_OF_THE_AXES = "the arrangement of the axes is MB1"
 THE_BEST_EXPLANATION_IS_AN_ERROR = "the best explanation is an error in x that depends on x"
-THE_OFFSET_OF_PROBE_LEFT = "the offset of probe left is another one (x is -40 mm, not -50 mm)"

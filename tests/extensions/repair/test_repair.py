@@ -1,27 +1,29 @@
-"""Repairs of deficient and weak designs: whatever is told is written out as a file and computed
-again.
+"""Repairs of designs: whatever is proposed is written out as a file and computed again, and
+compared with a search that tries everything.
 """
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable
 from dataclasses import replace
 from functools import cache
-from itertools import product
+from itertools import combinations
+from math import inf
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import yaml
-from ballplate.extensions.repair import repair_search
-from ballplate.extensions.repair.changes import Change, ChangeKind, apply_all
-from ballplate.extensions.repair.judging import examine, judge
-from ballplate.extensions.repair.mending import invents, mended, to_write
-from ballplate.extensions.repair.offers import offers
-from ballplate.extensions.repair.repair_search import Repair, Repairs, repairs
-from ballplate.extensions.repair.repair_tables import repair_lines
-from ballplate.extensions.repair.screening import rank_of, seen_by
+from ballplate.extensions.repair.candidates import along_rotation, candidates
+from ballplate.extensions.repair.changes import Change, ChangeKind, changed, scale_readings
+from ballplate.extensions.repair.mending import mended
+from ballplate.extensions.repair.repair_search import loosened, repairs
+from ballplate.extensions.repair.repairs import Repair, Repairs
+from ballplate.extensions.repair.search import Losses, best_set, change_pool, mean_target
 from ballplate.planning.checked_files import Wanted, check_files
+from ballplate.presentation.formatting import number
 from ballplate.results.checked_designs import check, predict
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
@@ -33,9 +35,7 @@ from ballplate.simulator.experiment.model import (
     Pool,
     Position,
 )
-from ballplate.uncertainty.scale import with_offsets
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
+from ballplate.simulator.experiment.pools import seconds_of
 
 from tests.extensions.repair import wording
 from tests.reference import dense
@@ -43,16 +43,12 @@ from tests.reference import dense
 NPL = Path("designs/npl")
 DEFICIENT = [
     ("npl/6.1.1", "B"),
-    ("npl/6.1.1", "D"),
     ("npl/6.2.1", "n=4 NDEL=7"),
-    ("npl/6.2.2", "grid n=7 NDEL=10"),
     ("hocken_borchardt/angles", "half a turn"),
     ("hocken_borchardt/angles", "shifted only"),
-    ("hocken_borchardt/angles", "half a turn, equal scales"),
     ("hurt_foss/bar-bell", "length unknown"),
     ("hurt_foss/bar-bell", "flat"),
     ("hurt_foss/bar-bell", "one axis"),
-    ("hurt_foss/bar-bell", "axes only"),
     ("hurt_foss/bryan-gauge", "radius unknown"),
 ]
 
@@ -64,11 +60,7 @@ def design(file: str, variant: str) -> Experiment:
 
 @cache
 def repaired(file: str, variant: str) -> Repairs:
-    found = repairs(
-        design(file, variant), most=2 if variant in ("D", "n=4 NDEL=7", "grid n=7 NDEL=10") else 3
-    )
-    assert found is not None
-    return found
+    return repairs(design(file, variant))
 
 
 def plain(path: Path, variant: str | None) -> dict[str, Any]:
@@ -112,33 +104,41 @@ def written_out(said: dict[str, Any], repair: Repair, folder: Path) -> Experimen
     return found
 
 
+def minutes(experiment: Experiment) -> float:
+    return sum(map(seconds_of, experiment.positions)) / 60.0
+
+
+def hold(said: dict[str, Any], experiment: Experiment, found: Repairs, folder: Path) -> None:
+    """What each repair prints is what the file with its edits has."""
+    names = {one.name for one in experiment.positions}
+    for repair in found.repairs:
+        after = written_out(dict(yaml.safe_load(yaml.safe_dump(said))), repair, folder)
+        planned, verdict = predict(after), check(after).verdict
+        assert (verdict.deficiency, len(verdict.weak)) == (repair.deficiency, repair.weak)
+        assert f"smallest singular value {repair.smallest:.3g}" in repair.outcome
+        rank = verdict.singular_values[-1 - verdict.deficiency]
+        np.testing.assert_allclose(rank, repair.smallest, rtol=1e-5)
+        assert ("full rank" in repair.outcome) == (not verdict.deficiency)
+        if planned.lengths is not None:
+            assert f"average U6 {number(1e6 * planned.lengths.average)} µm" in repair.outcome
+        more = sum(one.count for one in after.positions)
+        assert repair.readings == more - sum(one.count for one in experiment.positions)
+        if experiment.pool is None:
+            np.testing.assert_allclose(repair.seconds / 60.0, minutes(after) - minutes(experiment))
+        assert len({one.name for one in after.positions}) == len(after.positions)
+        assert names <= {one.name for one in after.positions}
+        lower, upper = after.machine.volume.of_readings
+        for one in after.positions:
+            rows = scale_readings(one, after.layouts[one.artefact], after.probes)
+            assert ((rows >= lower) & (rows <= upper)).all()
+
+
 @pytest.mark.parametrize("file, variant", DEFICIENT)
-def test_repaired_files_have_full_rank(file: str, variant: str, tmp_path: Path) -> None:
+def test_repaired_files_have_what_is_printed(file: str, variant: str, tmp_path: Path) -> None:
     found = repaired(file, variant)
-    before = check(design(file, variant)).verdict
-    assert found.complete
-    for repair in found.complete:
-        after = check(
-            written_out(plain(Path(f"designs/{file}.yaml"), variant), repair, tmp_path)
-        ).verdict
-        assert after.deficiency == repair.deficiency == 0
-        assert len(after.weak) == repair.weak
-        np.testing.assert_allclose(after.singular_values[-1], repair.smallest, rtol=1e-5)
-        assert repair.removes == tuple(range(before.deficiency))
-    for repair in found.partial:
-        after = check(
-            written_out(plain(Path(f"designs/{file}.yaml"), variant), repair, tmp_path)
-        ).verdict
-        assert after.deficiency == repair.deficiency == before.deficiency - len(repair.removes)
-        # What is left open has no part in what is said to be removed.
-        gone = {part.name for k in repair.removes for part in before.null[k].functions}
-        stays = {
-            part.name
-            for k, one in enumerate(before.null)
-            if k not in repair.removes
-            for part in one.functions
-        }
-        assert not (gone - stays) & {part.name for one in after.null for part in one.functions}
+    assert found.repairs and not found.repairs[0].deficiency
+    assert [one.order for one in found.repairs] == sorted(one.order for one in found.repairs)
+    hold(plain(Path(f"designs/{file}.yaml"), variant), design(file, variant), found, tmp_path)
 
 
 @pytest.mark.parametrize("file, variant", DEFICIENT)
@@ -148,13 +148,12 @@ def test_the_first_repair_is_written_into_the_shipped_file(
     """Nothing of the file is another than before but the one variant, read by PyYAML alone."""
     source = Path(f"designs/{file}.yaml")
     text = source.read_text(encoding="utf-8")
-    found_repairs = repaired(file, variant)
-    repair = to_write(found_repairs, check(design(file, variant)).verdict)
+    found = repaired(file, variant)
+    repair = found.to_write(check(design(file, variant)).verdict)
     if repair is None:
         # Only certificates are left, which --fix prints and the studio writes.
-        assert found_repairs is not None
-        repair = found_repairs.complete[0]
-        assert invents(repair)
+        repair = found.repairs[0]
+        assert repair.invents
     new = mended(text, source, variant, repair)
     before, after = yaml.safe_load(text), yaml.safe_load(new)
     assert after["variants"].pop(variant)["expected_rank_deficiency"] == 0
@@ -164,45 +163,17 @@ def test_the_first_repair_is_written_into_the_shipped_file(
     assert [line.partition("#")[2] for line in new.split("\n") if "#" in line] == lines
     path = tmp_path / source.name
     path.write_text(new, encoding="utf-8")
-    said = plain(path, variant)
-    path.write_text(yaml.safe_dump(said), encoding="utf-8")
-    (found,) = load(path)
-    assert check(found).verdict.deficiency == 0
-    if file == "npl/6.1.1":
-        problem = dense.planned(lay_out(found), 5, 5)
-        whole = dense.jacobian(lambda step: dense.residuals(problem, step), problem.parameters)
-        assert dense.spread(whole).deficiency == 0
-
-
-def frees_scale(experiment: Experiment, repair: Repair, rest: list[Change]) -> bool:
-    """Whether what is left out of a repair is a certificate without which U6 is twice as large where
-    offsets are known to a micrometre.
-    """
-    loose = predict(with_offsets(apply_all(rest, experiment), 1e-6)).quantities["U6"].average
-    assert repair.loosened is not None and repair.changes[-1].kind is ChangeKind.CERTIFICATE
-    return loose > 2.0 * repair.loosened.total / repair.loosened.count
-
-
-@pytest.mark.parametrize("file, variant", DEFICIENT)
-def test_nothing_can_be_left_out(file: str, variant: str) -> None:
-    experiment = design(file, variant)
-    for repair in repaired(file, variant).complete:
-        for left_out in repair.changes if len(repair.changes) > 1 else ():
-            rest = [one for one in repair.changes if one is not left_out]
-            verdict = check(apply_all(rest, experiment)).verdict
-            assert (
-                verdict.deficiency
-                or len(verdict.weak) > repair.weak
-                or frees_scale(experiment, repair, rest)
-            )
+    path.write_text(yaml.safe_dump(plain(path, variant)), encoding="utf-8")
+    (read,) = load(path)
+    assert check(read).verdict.deficiency == 0
 
 
 @pytest.mark.parametrize("file, variant", DEFICIENT[:1])
 def test_a_dense_computation_agrees(file: str, variant: str) -> None:
     experiment = design(file, variant)
-    for changes in [(), *(one.changes for one in repaired(file, variant).complete)]:
-        changed = lay_out(apply_all(changes, experiment))
-        problem = dense.planned(changed, 5, 5)
+    for changes in [(), *(one.changes for one in repaired(file, variant).repairs)]:
+        after = lay_out(changed(experiment, changes))
+        problem = dense.planned(after, 5, 5)
         whole = dense.jacobian(
             lambda step, of=problem: dense.residuals(of, step), problem.parameters
         )  # type: ignore[misc]
@@ -223,62 +194,6 @@ positions:
 calibration: [{kind: coordinates, balls: [r1c1, r1c6, r5c1], standard_uncertainty: 0.4 um}]
 evaluation: {points: {random: 20, seed: 1}, probe: down}
 """
-
-
-def test_more_readings_help_two_level_positions(tmp_path: Path) -> None:
-    path = tmp_path / "flat.yaml"
-    path.write_text(FLAT)
-    experiment = load(path)[0]
-    found = repairs(experiment)
-    assert found is not None and found.complete
-    for one in found.complete:
-        problem = dense.planned(lay_out(apply_all(one.changes, experiment)), 4, 4)
-        whole = dense.jacobian(
-            lambda step, of=problem: dense.residuals(of, step), problem.parameters
-        )  # type: ignore[misc]
-        assert dense.spread(whole).deficiency == 0
-
-
-def test_words_name_errors_and_positions() -> None:
-    experiment = design("npl/6.1.1", "B")
-    lines = repair_lines(repaired("npl/6.1.1", "B"), check(experiment).verdict)
-    first, written = lines[:2]
-    assert wording.REPAIR_TURN_POSITION_BY_ONE_QUARTER in first
-    assert wording.FULL_RANK_AND_NOTHING_IS_WEAKLY in first
-    assert "; removes undetermined 1 and 2 (" in first and "scale rests" not in first
-    assert all(name in first for name in ("EXX", "EYY", "EZZ", wording.SMALLEST_SINGULAR_VALUE))
-    assert written.startswith(wording.REPAIR_IN_THE_FILE_POSITIONS)
-    kinds = [[one.kind for one in each.changes] for each in repaired("npl/6.1.1", "B").complete]
-    assert kinds == [
-        [ChangeKind.MOVE, ChangeKind.CERTIFICATE],
-        [ChangeKind.MOVE],
-        [ChangeKind.READ_MORE],
-    ]
-
-
-@pytest.mark.parametrize("file, variant", DEFICIENT[:3])
-def test_screening_tells_the_rank(file: str, variant: str) -> None:
-    """Rows of added observations on the null directions against the full computation."""
-    base = examine(design(file, variant))
-    additions = [
-        one
-        for changes in offers(base.experiment).values()
-        for one in changes
-        if one.adds is not None
-    ]
-    seen = seen_by(base, additions)
-    assert len(seen) == len(additions)
-    generator = np.random.default_rng(3)
-    for k in generator.choice(len(additions), 12, replace=False):
-        after = judge(base.experiment, (additions[k],))
-        assert after is not None and after.deficiency == base.judged.deficiency - rank_of(
-            [seen[additions[k]]]
-        )
-    for _ in range(6):
-        chosen = [additions[k] for k in generator.choice(len(additions), 2, replace=False)]
-        after = judge(base.experiment, chosen)
-        assert after is not None
-        assert after.deficiency == base.judged.deficiency - rank_of([seen[one] for one in chosen])
 
 
 def small(**changed: Any) -> dict[str, Any]:
@@ -361,98 +276,240 @@ def empirical() -> dict[str, Any]:
     return said
 
 
-def of_a_file() -> dict[str, Any]:
-    said = one_plane()
-    said["machine"]["volume"] = ["1000 mm", "800 mm", "600 mm"]
-    path = Path("designs/park/machines/gec-like.yaml").resolve()
-    said["error_model"] = {"kind": "machine", "file": str(path)}
+TRAPS = {
+    one.__name__: one
+    for one in (only_probe, one_plane, no_length, nothing_known, flat_metric, empirical)
+}
+
+
+def flat_kinematic() -> dict[str, Any]:
+    said: dict[str, Any] = yaml.safe_load(FLAT)
     return said
 
 
-TRAPS = {
-    one.__name__: one
-    for one in (only_probe, one_plane, no_length, nothing_known, flat_metric, empirical, of_a_file)
-}
+TRAPS["flat_kinematic"] = flat_kinematic
 
 
 def loaded(said: dict[str, Any], folder: Path) -> Experiment:
     path = folder / "trap.yaml"
     path.write_text(yaml.safe_dump(said), encoding="utf-8")
-    (found,) = load(path)
+    (found,) = load(path, planning=True)
     return found
 
 
 @pytest.mark.parametrize("trap", sorted(TRAPS))
 def test_traps(trap: str, tmp_path: Path) -> None:
+    experiment = loaded(TRAPS[trap](), tmp_path)
+    found = repairs(experiment)
+    assert check(experiment).verdict.deficiency
+    assert found.repairs and not found.repairs[0].deficiency, found.lines()
+    hold(TRAPS[trap](), experiment, found, tmp_path)
+    for k, repair in enumerate(found.repairs, 1):
+        (line,) = (one for one in found.lines() if one.startswith(f"repair {k}: "))
+        after = written_out(TRAPS[trap](), repair, tmp_path)
+        scale = check(after).scale
+        assert scale is not None
+        assert scale.rests_on_offsets == (wording.SCALE_RESTS_ON_PROBE_OFFSETS in line)
+        loose = re.search(r"average U6 [\d.e+-]+ µm, ([\d.e+-]+) µm with 1 µm on the exact", line)
+        assert (loose is not None) == (len(after.probes) > 1)
+        if loose is not None:
+            said = yaml.safe_load((tmp_path / "repaired.yaml").read_text(encoding="utf-8"))
+            for name in [*said["probes"]][1:]:
+                offset = {"offset": said["probes"][name], "standard_uncertainty": "1 um"}
+                said["probes"][name] = offset
+            uncertain = predict(loaded(said, tmp_path)).quantities["U6"].average
+            assert loose[1] == number(1e6 * uncertain)
+
+
+def test_an_unknown_scale_needs_a_length_or_a_probe(tmp_path: Path) -> None:
+    found = repairs(loaded(nothing_known(), tmp_path))
+    assert found.repairs and all(one.invents for one in found.repairs)
+    assert found.to_write(check(loaded(nothing_known(), tmp_path)).verdict) is None
+
+
+# The search compared with one that tries everything.
+
+
+def everything(
+    experiment: Experiment, changes: Iterable[Change], size: int
+) -> list[tuple[float, float, tuple[Change, ...]]]:
+    """Every set of a size of compatible changes that determines everything well, by the full
+    computation of the changed design: minutes, U6 with uncertain offsets, changes.
+    """
+    found = []
+    for chosen in combinations(changes, size):
+        if len({one.subject for one in chosen}) < size:
+            continue
+        after = changed(experiment, chosen)
+        if loosened(after) < inf:
+            verdict = check(after).verdict
+            if not verdict.deficiency and not verdict.weak:
+                seconds = sum(one.seconds + 600.0 * one.values for one in chosen)
+                found.append((seconds, loosened(after), chosen))
+    return found
+
+
+@pytest.mark.parametrize("kind", ChangeKind)
+@pytest.mark.parametrize("trap", ["one_plane", "only_probe"])
+def test_single_changes_are_those_of_a_complete_search(
+    trap: str, kind: ChangeKind, tmp_path: Path
+) -> None:
     said = TRAPS[trap]()
+    said["artefacts"]["plate"]["balls"] = [3, 3]
+    said["evaluation"]["points"]["random"] = 20
     experiment = loaded(said, tmp_path)
-    before = check(experiment).verdict
-    found = repairs(experiment, most=2)
-    assert before.deficiency and found is not None and found.complete, repair_lines(found, before)
-    for repair in found.complete:
-        after = check(written_out(TRAPS[trap](), repair, tmp_path)).verdict
-        assert after.deficiency == repair.deficiency == 0 and len(after.weak) == repair.weak
+    changes = candidates(experiment)[::3]
+    every = everything(experiment, [one for one in changes if one.kind is kind], 1)
+    pool = change_pool(experiment, changes)
+    assert pool is not None
+
+    def is_sound(members: frozenset[int]) -> bool:
+        verdict = check(changed(experiment, pool.of(members))).verdict
+        return not verdict.deficiency and not verdict.weak
+
+    members, is_enough = best_set(pool, (kind,), is_sound, Losses(pool.problem))
+    if not every:
+        assert not is_enough or len(members) > 1
+        return
+    assert is_enough
+    seconds, u6, _ = min(every, key=lambda one: one[:2])
+    assert pool.effort(members) <= seconds * (1.0 + 1e-9)
+    if len(members) == 1 and pool.effort(members) == pytest.approx(seconds):
+        assert loosened(changed(experiment, pool.of(members))) == pytest.approx(u6, rel=1e-6)
 
 
-def test_an_unknown_scale_needs_a_length(tmp_path: Path) -> None:
-    experiment = loaded(nothing_known(), tmp_path)
-    found = repairs(experiment, most=1)
-    assert found is not None
-    for repair in found.complete:
-        words = " ".join(change.words for change in repair.changes)
-        assert "calibrate the " in words or wording.A_NEW_PROBE in words
+def test_pairs_of_moves_are_those_of_a_complete_search(tmp_path: Path) -> None:
+    """With a target that one move does not meet."""
+    said = example()
+    said["artefacts"]["plate"]["balls"] = [3, 3]
+    said["evaluation"]["points"]["random"] = 20
+    said["error_model"] |= {"position_coefficients": 3, "rotation_coefficients": 3}
+    experiment = loaded(said, tmp_path)
+    moves = [one for one in candidates(experiment) if one.kind is ChangeKind.MOVE][::6]
+    best = [min(u6 for _, u6, _ in everything(experiment, moves, size)) for size in (1, 2)]
+    assert best[1] < 0.95 * best[0]
+    pool = change_pool(experiment, moves)
+    assert pool is not None
+    for limit, size in ((0.5 * sum(best), 2), (1.01 * best[0], 1)):
+        aimed = replace(pool, limit=limit)
+        losses = Losses(pool.problem)
+        members, is_enough = best_set(aimed, (ChangeKind.MOVE,), lambda members: True, losses)
+        assert is_enough and len(members) == size
+        found = loosened(changed(experiment, pool.of(members)))
+        assert found == pytest.approx(best[size - 1], rel=1e-6)
 
 
-@pytest.mark.parametrize("variant, most", [("A w=0.01", 1), ("C w=0.01", 1)])
-def test_weak_directions(variant: str, most: int, tmp_path: Path) -> None:
-    experiment = design("npl/6.1.1-weights", variant)
+@pytest.mark.parametrize("chosen", [(), (3, 40), (7, 90, 200)])
+def test_information_of_changes_is_that_of_the_changed_design(chosen: tuple[int, ...]) -> None:
+    """The criterion of sets, moves and additions and certificates among them."""
+    experiment = load(Path("designs/quickstart.yaml"))[0]
+    changes = candidates(experiment)[::2]
+    pool = change_pool(experiment, changes)
+    assert pool is not None
+    members = frozenset(k % len(changes) for k in chosen)
+    after = changed(experiment, pool.of(members))
+    assert Losses(pool.problem).of(members) == pytest.approx(loosened(after), rel=1e-6)
+
+
+def example(size: str = "750 mm", corner: str = "125 mm", **changed: Any) -> dict[str, Any]:
+    """The first example with another plate, all corners alike and no turns."""
+    said: dict[str, Any] = yaml.safe_load(Path("designs/quickstart.yaml").read_text("utf-8"))
+    said["artefacts"]["plate"]["size"] = [size, size]
+    for one in said["positions"]:
+        one.pop("quarter_turns", None)
+        one["corner"] = dict.fromkeys(one["corner"], corner)
+    return said | changed
+
+
+def test_moves_of_positions_replace_invented_distances(tmp_path: Path) -> None:
+    """Turning *x high* and shifting *y high* by -125 mm gives 0.274 µm; 62 distances 0.379."""
+    experiment = loaded(example(), tmp_path)
+    by_hand = example()
+    by_hand["positions"][3]["quarter_turns"] = 1
+    by_hand["positions"][5]["corner"]["x"] = "0 mm"
+    of_hand = loosened(loaded(by_hand, tmp_path))
+    assert 1e6 * of_hand == pytest.approx(0.274, abs=0.001)
+    found = repairs(experiment)
+    hold(example(), experiment, found, tmp_path)
+    assert all(change.kind is ChangeKind.MOVE for change in found.repairs[0].changes)
+    assert found.repairs[0].loosened <= of_hand and not any(one.invents for one in found.repairs)
+
+
+def test_a_small_plate_moves_before_it_is_read_more(tmp_path: Path) -> None:
+    said = example("300 mm", "100 mm")
+    experiment = loaded(said, tmp_path)
+    found = repairs(experiment)
+    hold(said, experiment, found, tmp_path)
+    moved, read, *_ = found.repairs
+    assert len(moved.changes) <= 3 and not moved.seconds and moved.readings == 0
+    assert max(moved.loosened, read.loosened) <= mean_target(experiment)
+    assert read.seconds > 0
+
+
+def test_a_star_with_one_probe_a_plane_takes_minutes(tmp_path: Path) -> None:
+    said = yaml.safe_load(Path("designs/quickstart.yaml").read_text("utf-8"))
+    for one in said["positions"]:
+        one["probes"] = one["probes"][:1]
+    experiment = loaded(said, tmp_path)
+    found = repairs(experiment)
+    hold(said, experiment, found, tmp_path)
+    (first, *_) = found.repairs
+    assert first.seconds / 60.0 < 9.0 and first.loosened <= mean_target(experiment)
+
+
+def test_a_target_that_is_missed_at_full_rank_is_met(tmp_path: Path) -> None:
+    said = example(corner="0 mm") | {"target_uncertainty": "0.3 um"}
+    said["positions"][1]["quarter_turns"] = 1
+    said["positions"][2]["quarter_turns"] = 1
+    experiment = loaded(said, tmp_path)
+    verdict = check(experiment).verdict
+    assert not verdict.deficiency and loosened(experiment) > mean_target(experiment)
+    found = repairs(experiment)
+    hold(said, experiment, found, tmp_path)
+    assert found.repairs[0].loosened <= mean_target(experiment)
+
+
+def test_weak_directions(tmp_path: Path) -> None:
+    experiment = design("npl/6.1.1-weights", "A w=0.01")
     before = check(experiment).verdict
     assert not before.deficiency and before.weak
-    found = repairs(experiment, most)
-    assert found is not None and len(found.complete) == most and not found.partial
-    for repair in found.complete:
-        said = plain(NPL / "6.1.1-weights.yaml", variant)
-        after = check(written_out(said, repair, tmp_path)).verdict
-        assert not after.deficiency and not after.weak and not repair.weak
-    assert "removes" not in " ".join(repair_lines(found, before))
+    found = repairs(experiment)
+    assert found.repairs and not found.repairs[0].weak
+    hold(plain(NPL / "6.1.1-weights.yaml", "A w=0.01"), experiment, found, tmp_path)
 
 
 def test_nothing_to_repair() -> None:
-    assert repairs(design("npl/6.1.1", "A")) is None
+    assert repairs(design("npl/6.1.1", "C")) == Repairs()
 
 
-def test_what_cannot_be_repaired_is_said() -> None:
-    experiment = design("hurt_foss/bryan-gauge", "one plane")
-    (line,) = repair_lines(repairs(experiment), check(experiment).verdict)
+def test_where_nothing_helps_nothing_is_proposed() -> None:
+    (line,) = repairs(design("hurt_foss/bryan-gauge", "one plane")).lines()
     assert line.startswith(wording.NO_CHANGES_WERE_FOUND_THAT_DETERMINE)
 
 
-def test_changes_that_lead_out_of_the_volume_do_not_go_together() -> None:
-    """By the scale readings of every ball with every probe in the moved position."""
-    experiment = design("npl/6.1.1", "B")
-    found = offers(experiment)
-    search = repair_search._Search(examine(experiment), 1)
-    lower, upper = experiment.machine.volume.lower, experiment.machine.volume.upper
-    inside = {True: 0, False: 0}
-    for pair in product(found[ChangeKind.MOVE], found[ChangeKind.READ_MORE]):
-        changed = apply_all(pair, experiment)
-        scales = [
-            np.array(changed.layouts[one.artefact].coordinates)[group.ball_indices]
-            @ one.pose.rotation.T
-            + one.pose.origin
-            - changed.probes[probe].offset
-            for one in changed.positions
-            for group in one.readings
-            for probe in group.probes
-        ]
-        every = np.concatenate(scales)
-        fits = bool(((every >= lower - 1e-9) & (every <= upper + 1e-9)).all())
-        inside[fits] += 1
-        assert search.may_be(pair) == fits
-    assert min(inside.values()) > 10
+def test_what_a_plan_cannot_weigh_is_said(tmp_path: Path) -> None:
+    prior = {"parameter": "z high: origin x", "standard_uncertainty": "1 um"}
+    experiment = loaded(one_plane() | {"priors": [prior]}, tmp_path)
+    (line,) = repairs(experiment).lines()
+    assert wording.A_PLAN_CANNOT_WEIGH in line
 
 
-def pool_of(experiment: Experiment, seconds: list[float], at_most: tuple[AtMost, ...] = ()) -> Pool:
+@pytest.mark.parametrize("d", [2, 3])
+def test_bars_are_laid_along_a_direction(d: int) -> None:
+    generator = np.random.default_rng(d)
+    for u in (*generator.normal(size=(5, d)), np.eye(d)[-1]):
+        rotation = along_rotation(u / np.linalg.norm(u))
+        np.testing.assert_allclose(rotation[:, 0], u / np.linalg.norm(u), atol=1e-12)
+        np.testing.assert_allclose(rotation @ rotation.T, np.eye(d), atol=1e-12)
+        assert np.linalg.det(rotation) == pytest.approx(1.0)
+
+
+def pool_of(
+    experiment: Experiment,
+    seconds: list[float],
+    at_most: tuple[AtMost, ...] = (),
+    forbidden: Any = (),
+) -> Pool:
     """Positions of the experiment, drawn, then three to add: one that tells nothing, and two that
     tell all.
     """
@@ -470,40 +527,42 @@ def pool_of(experiment: Experiment, seconds: list[float], at_most: tuple[AtMost,
         for (name, pose), time in zip(named, seconds, strict=True)
     ]
     return Pool(
-        (*drawn, *more), ChangeTimes(60.0, 600.0), (), at_most, {}, np.zeros((0, 2, 3)), None
+        (*drawn, *more),
+        ChangeTimes(60.0, 600.0),
+        (),
+        at_most,
+        {},
+        np.reshape(forbidden, (-1, 2, 3)),
+        None,
     )
 
 
-def from_pool(experiment: Experiment, pool: Pool) -> list[str]:
-    found = repairs(replace(experiment, pool=pool), most=1)
-    assert found is not None
-    return [
-        change.words
-        for one in found.complete
-        for change in one.changes
-        if change.kind == ChangeKind.POOL
-    ]
+def test_the_cheapest_of_a_pool_within_its_limits() -> None:
+    """What costs nothing comes before what the pool has a price for, and without a target that
+    before what takes longer.
+    """
+    experiment = replace(design("npl/6.1.1", "B"), target_uncertainty=None)
+    for limits, is_offered in (((), True), ((AtMost((4, 6), 0),), False)):
+        pool = pool_of(experiment, [60.0, 5400.0, 600.0], limits)
+        moved, read = repairs(replace(experiment, pool=pool)).repairs
+        assert [one.kind for one in moved.changes] == [ChangeKind.MOVE]
+        (change,) = read.changes
+        assert (change.words == wording.ADD_OF_THE_POOL) == is_offered
+        assert read.seconds == (600.0 if is_offered else 855.0)
 
 
-def test_the_cheapest_of_a_pool() -> None:
+def test_no_position_is_moved_into_a_forbidden_box() -> None:
     experiment = design("npl/6.1.1", "B")
-    assert from_pool(experiment, pool_of(experiment, [60.0, 5400.0, 1800.0])) == [
-        wording.ADD_OF_THE_POOL_MIN
-    ]
-    # Of the two only as many as the limits leave.
-    no_more = (AtMost((4, 6), 0),)
-    pool = pool_of(experiment, [60.0, 5400.0, 1800.0], no_more)
-    assert from_pool(experiment, pool) == [wording.ADD_OF_THE_POOL]
-
-
-def test_what_costs_nothing_is_told_before_what_the_pool_has_a_price_for() -> None:
-    experiment = design("npl/6.1.1", "B")
-    found = repairs(replace(experiment, pool=pool_of(experiment, [60.0, 5400.0, 1800.0])), most=2)
-    assert found is not None and not any(one.weak or one.is_faint for one in found.complete)
-    assert [[change.kind for change in one.changes] for one in found.complete] == [
-        [ChangeKind.MOVE],
-        [ChangeKind.POOL],
-    ]
+    free = candidates(replace(experiment, pool=pool_of(experiment, [1.0] * 3)))
+    box = np.array([[[0.0, 0.0, 0.15], [1.0, 1.0, 1.0]]])
+    pool = pool_of(experiment, [1.0] * 3, (), box)
+    bounded = candidates(replace(experiment, pool=pool))
+    moves = [one.item for one in bounded if one.kind is ChangeKind.MOVE]
+    assert moves and len(moves) < sum(one.kind is ChangeKind.MOVE for one in free)
+    for one in moves:
+        assert isinstance(one, Position)
+        balls = experiment.layouts["plate"].coordinates @ one.pose.rotation.T + one.pose.origin
+        assert balls[:, 2].max() <= 0.15 + 1e-9
 
 
 def test_a_pool_of_a_file(tmp_path: Path) -> None:
@@ -513,92 +572,11 @@ def test_a_pool_of_a_file(tmp_path: Path) -> None:
     path.write_text(yaml.safe_dump(said), encoding="utf-8")
     (checked,) = check_files([path], wanted=Wanted(repairs=True))
     (one,) = checked.designs
-    suggested = one.suggestions.repairs
-    assert suggested is not None and one.prediction.verdict.deficiency
-    first = suggested.complete[0]
-    assert [change.kind for change in first.changes] == [ChangeKind.POOL]
+    assert isinstance(one.suggestions, Repairs) and one.prediction.verdict.deficiency
+    first = one.suggestions.repairs[0]
+    assert any(change.candidate >= 0 for change in first.changes)
     after = check(written_out(said, first, tmp_path)).verdict
     assert not after.deficiency and not after.weak
-
-
-def test_other_additions_than_the_pools_are_not_told() -> None:
-    experiment = design("npl/6.1.1", "B")
-    found = offers(replace(experiment, pool=pool_of(experiment, [1.0, 2.0, 3.0])))
-    assert ChangeKind.ADD_POSITION not in found and ChangeKind.CERTIFICATE not in found
-    assert [one.cost for one in found[ChangeKind.POOL]] == [1.0, 2.0, 3.0]
-
-
-def test_a_set_of_a_pool_is_minimal() -> None:
-    """Distances of one line each, of which two are needed."""
-    experiment = design("npl/6.1.1", "B")
-    single = [one for one in offers(experiment)[ChangeKind.CERTIFICATE] if one.cost == 1.0]
-    drawn = [Candidate(one.name, one, 600.0, "", "", True, {}) for one in experiment.positions]
-    more = [
-        Candidate(one.words, one.adds, 60.0 * (k + 1), "", "", False, {})
-        for k, one in enumerate(single)
-        if one.adds is not None
-    ]
-    pool = Pool((*drawn, *more), ChangeTimes(0.0, 0.0), (), (), {}, np.zeros((0, 2, 3)), None)
-    found = repairs(replace(experiment, pool=pool), most=1)
-    assert found is not None
-    chosen = found.complete[0].changes
-    assert [one.kind for one in chosen] == [ChangeKind.POOL, ChangeKind.POOL]
-    base = examine(experiment)
-    costs = {frozenset((a, b)): a.cost + b.cost for a in chosen for b in chosen if a is not b}
-    seen = seen_by(base, single)
-    cheapest = min(
-        (60.0 * (i + 1) + 60.0 * (k + 1))
-        for i, one in enumerate(single)
-        for k, other in enumerate(single[:i])
-        if rank_of([seen[one], seen[other]]) == 2
-    )
-    assert set(costs.values()) == {cheapest}
-
-
-@settings(
-    max_examples=3, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
-)
-@given(
-    chosen=st.sets(st.integers(0, 5), min_size=1, max_size=3),
-    coefficients=st.integers(2, 3),
-    turns=st.integers(0, 3),
-    with_length=st.booleans(),
-)
-def test_whatever_is_told_holds(
-    tmp_path_factory: pytest.TempPathFactory,
-    chosen: set[int],
-    coefficients: int,
-    turns: int,
-    with_length: bool,
-) -> None:
-    folder = tmp_path_factory.mktemp("any")
-
-    def said() -> dict[str, Any]:
-        found = small()
-        found["positions"] = [found["positions"][k] for k in sorted(chosen)]
-        found["positions"][-1]["quarter_turns"] = turns
-        found["error_model"]["position_coefficients"] = coefficients
-        found["artefacts"]["plate"]["balls"] = [3, 3]
-        found["calibration"] = found["calibration"] if with_length else []
-        return found
-
-    experiment = loaded(said(), folder)
-    before = check(experiment).verdict
-    found = repairs(experiment, most=2)
-    if found is None:
-        assert not before.deficiency and not before.weak
-        return
-    for repair in (*found.complete, *found.partial):
-        after = check(written_out(said(), repair, folder)).verdict
-        assert (after.deficiency, len(after.weak)) == (repair.deficiency, repair.weak)
-    for repair in found.complete:
-        assert not repair.deficiency
-        for one in repair.changes if len(repair.changes) > 1 else ():
-            rest = [other for other in repair.changes if other is not one]
-            left = judge(experiment, rest)
-            assert left is not None and (
-                left.deficiency or left.weak > repair.weak or frees_scale(experiment, repair, rest)
-            )
 
 
 def test_suggestions_do_not_ask_for_all_candidates_in_one_design(
@@ -611,11 +589,9 @@ def test_suggestions_do_not_ask_for_all_candidates_in_one_design(
         {"influences": [each], "artefacts.plate": few, "error_model": {"kind": "metric"}}
     )
     deficient = replace(base, positions=base.positions[:1])
-    at_large = repairs(deficient, most=1)
-    shared = examine(deficient).at.design
-    most = shared.parameter_count + 100
+    at_large = repairs(deficient)
+    most = lay_out(deficient).parameter_count + 100
     monkeypatch.setattr("ballplate.simulator.experiment.influences.MOST_SHARED", most)
-    limited = repairs(deficient, most=1)
-    assert at_large is not None and limited is not None
-    assert limited.complete
-    assert [one.edits for one in limited.complete] == [one.edits for one in at_large.complete]
+    limited = repairs(deficient)
+    assert limited.repairs
+    assert [one.edits for one in limited.repairs] == [one.edits for one in at_large.repairs]

@@ -49,7 +49,7 @@ def is_kept(old: str, new: str) -> bool:
     return all(one in rest for one in old)
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(
     random=st.integers(0, 2**32).map(Random),
     line_end=st.sampled_from(["\n", "\r\n"]),
@@ -75,7 +75,7 @@ def test_all_but_one_value_stays(random: Random, line_end: str, has_last: bool) 
     assert with_changes(text, "f", [TextChange(path, "375 mm")]) == expected
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(
     random=st.integers(0, 2**32).map(Random),
     line_end=st.sampled_from(["\n", "\r\n"]),
@@ -106,7 +106,7 @@ def test_all_stays_beside_what_is_added(
     assert after.endswith("\n") == text.endswith("\n")
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(random=st.integers(0, 2**32).map(Random), has_comments=st.booleans())
 def test_all_stays_beside_what_is_removed(random: Random, has_comments: bool) -> None:
     said = data(random)

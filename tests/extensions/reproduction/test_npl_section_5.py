@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 from ballplate.extensions.reproduction import compare
-from ballplate.extensions.reproduction.compare import compare_progress
+from ballplate.extensions.reproduction.compare import compare_iterations
 from ballplate.extensions.reproduction.published import npl
 from ballplate.extensions.reproduction.shipped import (
     Shipped,
@@ -52,13 +52,11 @@ def steps(found: Fit) -> list[float]:
     return [iteration.step for iteration in found.solution.iterations[1:]]
 
 
-@pytest.mark.parametrize(
-    "progress", npl().statements.convergence, ids=lambda progress: progress.design
-)
-def test_published_iterations(progress, monkeypatch: pytest.MonkeyPatch) -> None:  # type: ignore[no-untyped-def]
+@pytest.mark.parametrize("published", npl().convergence, ids=lambda published: published.design)
+def test_published_iterations(published, monkeypatch: pytest.MonkeyPatch) -> None:  # type: ignore[no-untyped-def]
     monkeypatch.setattr(compare, "fitted_exactly", fitted_once)
-    found = compare_progress(npl(), SHIPPED, progress)
-    assert found.agrees, [line for line in found.lines if not line.agrees]
+    found = compare_iterations(npl(), SHIPPED, published)
+    assert found and all(row.agrees for row in found), found
 
 
 @pytest.mark.parametrize(

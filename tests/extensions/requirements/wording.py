@@ -1,7 +1,6 @@
 """The wording that the tests of requirements expect: a rewording is entered here alone."""
 
 FROM_MM_MM = "from 1010 mm x 1010 mm on, the file is invalid: positions[0]: reading ball"
-REPEATS_OF_EVERY_READING = "repeats of every reading"
 THE_FILE_HAS_NO_TASKS = "the file has no tasks"
 THE_FILE_IS_INVALID = "the file is invalid with 2 x 2, 3 x 2"
 UNKNOWN_ARTEFACT_DID_YOU_MEAN = 'unknown artefact "plat"; did you mean "plate"?'

@@ -11,9 +11,9 @@ import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.cli import main
+from ballplate.extensions.splines.compensated_points import compensated_points
+from ballplate.extensions.splines.curve_result import FittedCurve
 from numpy.testing import assert_allclose
-
-from tests.extensions.splines import wording
 
 TABLE = Path("designs/gilsinn/table-1.csv")
 RADIUS = 0.037084
@@ -39,105 +39,43 @@ def part(path: Path, error: float = 0.0) -> Path:
     return path
 
 
+def moved(curve: FittedCurve) -> tuple[list[str], np.ndarray, np.ndarray]:
+    assert curve.curve.profile is not None
+    return compensated_points(curve.curve, curve.curve.profile)
+
+
 def test_points_of_the_dome_are_moved_along_its_radii() -> None:
     curve = bp.spline(TABLE, y="semi_finish_error", points="13-32")
-    found = curve.compensated()
-    radial = (found.nominal - CENTRE) / RADIUS
+    _, nominal, found = moved(curve)
+    errors = curve.values(curve.curve.fit.x)
     # Nominal co-ordinates are within 0.02 µm of the circle, 2.8 mm apart.
-    assert_allclose(found.normals, radial, atol=1e-5)
-    assert_allclose(found.errors, curve.values(curve.curve.fit.x))
-    assert_allclose(
-        np.linalg.norm(found.compensated - CENTRE, axis=1), RADIUS - found.errors, atol=2.1e-8
-    )
-
-
-def test_nominal_points_between_the_measured_ones(tmp_path: Path) -> None:
-    """On a circle the arc length from the first point is the angle times the radius."""
-    angles = np.deg2rad([85.1, 60.0, 33.3, 5.0])
-    places = CENTRE + RADIUS * np.stack([np.sin(angles), np.cos(angles)], 1)
-    file = tmp_path / "nominal.csv"
-    told = [f"{1e3 * x!r},{1e3 * z!r}" for x, z in places.tolist()]
-    file.write_text("\n".join(["nominal_x_mm,nominal_z_mm", *told, ""]))
-    curve = bp.spline(TABLE, y="semi_finish_error", points="13-32")
-    found = curve.compensated(file)
-    first = np.array([36.99706e-3, -34.54598e-3]) - CENTRE
-    lengths = RADIUS * (np.arctan2(*first) - angles)
-    assert_allclose(found.errors, curve.values(lengths), atol=2e-9)
-    assert_allclose(found.normals, (places - CENTRE) / RADIUS, atol=1e-5)
-    file.write_text("nominal_x_mm,nominal_z_mm\n36,-30\n")
-    with pytest.raises(bp.ExperimentError, match=wording.IS_NOT_ON_THE_PROFILE):
-        curve.compensated(file)
-    file.write_text("nominal_x_mm,nominal_z_mm\n37.084,-37.084\n")
-    with pytest.raises(bp.ExperimentError, match=wording.IS_NOT_ON_THE_PROFILE):
-        curve.compensated(file)
+    radial = (nominal - CENTRE) / RADIUS
+    assert_allclose(found, nominal - errors[:, None] * radial, atol=1e-9)
 
 
 def test_a_corner_is_where_the_compensated_features_cross(tmp_path: Path) -> None:
     curve = bp.spline(
         part(tmp_path / "part.csv"), corner=["20 mm, 0 mm"], straight=[1, 2], knots="none"
     )
-    assert wording.FEATURES_MEET_AT_A_CORNER in str(curve)
+    assert "meet at a corner at 20 mm, with errors 10 µm and 4 µm" in str(curve)
     assert curve.curve.fit.free == 4
-    found = curve.compensated()
-    assert found.names[-1] == "corner 1"
-    cone, cylinder = np.array([0.8, 0.6]), np.array([1.0, 0.0])
+    names, nominal, found = moved(curve)
+    assert names[-2:] == ["8", "corner 1"] and nominal[-1].tolist() == [0.02, 0.0]
     # 4 µm and 10 µm inside; slopes of 5e-4 change the place by as much of ways of 20 µm.
     inside = (-10e-6 + 0.8 * 4e-6) / 0.6
-    assert_allclose(found.compensated[-1], [0.02 - 4e-6, inside], atol=1.2e-8)
-    assert_allclose(found.normals[0], cone, atol=1e-12)
-    assert_allclose(found.normals[5], cylinder, atol=1e-12)
+    assert_allclose(found[-1], [0.02 - 4e-6, inside], atol=1.2e-8)
+    assert_allclose(found[0], nominal[0], atol=1e-15)
+    assert_allclose(nominal[3] - found[3], 7.5e-6 * np.array([0.8, 0.6]), atol=1e-12)
     # Neighbouring compensated points and the corner are in one line.
-    for run in (found.compensated[:4], found.compensated[4:8]):
-        a, b, c = run[0], run[-1], found.compensated[-1]
-        ways = b - a, c - a
-        assert abs(ways[0][0] * ways[1][1] - ways[0][1] * ways[1][0]) < 1e-14
+    for run in (found[:4], found[4:8]):
+        (a, b), (c, d) = run[-1] - run[0], found[-1] - run[0]
+        assert abs(a * d - b * c) < 1e-14
 
 
-def test_the_uncertainty_of_a_corner_is_that_of_repeated_parts(tmp_path: Path) -> None:
-    """Errors of the points drawn again and again, with a standard deviation of 1 µm."""
-    places, generator = [], np.random.default_rng(4)
-    lines = part(tmp_path / "part.csv").read_text().split("\n")
-    for _ in range(80):
-        drawn = []
-        for line in lines[1:-1]:
-            *nominal, error = line.split(",")
-            drawn.append(",".join([*nominal, repr(float(error) + generator.standard_normal())]))
-        file = tmp_path / "drawn.csv"
-        file.write_text("\n".join([lines[0], *drawn, ""]))
-        found = bp.spline(
-            file,
-            corner=["20 mm, 0 mm"],
-            straight=[1, 2],
-            knots="none",
-            uncertainty="1 um",
-        ).compensated()
-        places.append(found.compensated[-1])
-    exact = bp.spline(
-        tmp_path / "part.csv",
-        corner=["20 mm, 0 mm"],
-        straight=[1, 2],
-        knots="none",
-        uncertainty="1 um",
-    ).compensated()
-    along = (np.array(places) - np.mean(places, axis=0)) @ exact.normals[-1]
-    # A standard deviation of 80 is known to 8 %; four of these.
-    assert abs(along.std(ddof=1) / exact.uncertainties[-1] - 1.0) < 0.32
-
-
-@pytest.mark.parametrize(
-    ("more", "told"),
-    [
-        ({"boundary": ["20 mm, 0 mm"]}, "a corner and a boundary"),
-        (
-            {"at": [("20 mm, 0 mm", "value", "0 um")]},
-            "no value or slope can be prescribed at the corner",
-        ),
-    ],
-)
-def test_what_does_not_go_with_a_corner(more: dict[str, object], told: str, tmp_path: Path) -> None:
+def test_a_boundary_is_no_corner(tmp_path: Path) -> None:
     file = part(tmp_path / "part.csv")
-    with pytest.raises(bp.ExperimentError, match=told):
-        bp.spline(file, corner=["20 mm, 0 mm"], straight=[1, 2], knots="none", **more)
+    with pytest.raises(bp.ExperimentError, match="20 mm is a corner and a boundary"):
+        bp.spline(file, corner=["20 mm, 0 mm"], boundary=["20 mm, 0 mm"])
 
 
 def test_features_that_are_tangent_make_no_corner(tmp_path: Path) -> None:
@@ -156,8 +94,9 @@ def test_the_command_writes_the_points(tmp_path: Path, capsys: pytest.CaptureFix
     assert main([*command, "--knots", "none", "--compensated", str(out)]) == 0
     found = rows(out)
     assert [row["point"] for row in found][-2:] == ["8", "corner 1"]
-    assert found[0]["error_um"] == "0.0000" and found[3]["offset_um"] == "-7.5000"
-    assert float(found[-1]["compensated_x_mm"]) == pytest.approx(19.996, abs=5e-6)
-    capsys.readouterr()
-    assert main([*command, "--nominal", str(file)]) == 2
-    assert wording.NOMINAL_IS_FOR_COMPENSATED in capsys.readouterr().err
+    assert float(found[4]["nominal_z_mm"]) == 4.0
+    assert float(found[-1]["compensated_x_mm"]) == pytest.approx(19.996, abs=1.2e-5)
+    for option in ("--compensated", "--whiskers"):
+        path = str(tmp_path / f"{option}.svg")
+        assert main([*command[:2], "--x", "nominal_z", option, path]) == 3
+        assert "errors are normal to a profile" in capsys.readouterr().err

@@ -6,16 +6,11 @@ import csv
 import json
 from pathlib import Path
 
+import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.extensions.splines.error_curve import (
-    CurveSettings,
-    ErrorCurve,
-    Hold,
-    fit_curve,
-)
-from ballplate.extensions.splines.read_points import choose_points, read_points
+from ballplate.extensions.splines.error_curve import ErrorCurve
 from ballplate.simulator.splines.polynomial_pieces import pieces
 
 from tests.reference import truncated_powers
@@ -25,7 +20,7 @@ OURS, DOCUMENT = (
     Path("tests/extensions/splines/nistir-6517-table1.csv"),
 )
 RADIUS = 0.037084
-TANGENT = (RADIUS, -RADIUS)
+FEATURES = {"boundary": ["37.084 mm, -37.084 mm"], "straight": [1]}
 
 
 def columns(path: Path) -> dict[str, list[str]]:
@@ -34,9 +29,8 @@ def columns(path: Path) -> dict[str, list[str]]:
     return {name: [row[name] for row in rows] for name in rows[0]}
 
 
-def dome(settings: CurveSettings, points: str = "12-32") -> ErrorCurve:
-    everything = read_points(OURS, y="semi_finish_error")
-    return fit_curve(everything.chosen(choose_points(everything, points, str(OURS))), settings)
+def dome(**wanted: object) -> ErrorCurve:
+    return bp.spline(OURS, y="semi_finish_error", points="12-32", **wanted).curve
 
 
 def test_the_shipped_table_is_the_documents() -> None:
@@ -64,16 +58,16 @@ def test_the_dome_is_a_quarter_of_a_circle_tangent_to_a_cylinder() -> None:
 
 @pytest.mark.parametrize("every", [4, 5])
 def test_the_dome_with_zero_slope_at_the_linear_feature(every: int) -> None:
-    curve = dome(CurveSettings(every=every, holds=(Hold("start", 1, 0.0),)))
-    fitted = curve.fit
-    scale = np.abs(fitted.y).max()
-    assert abs(fitted.violation(curve.holds[0])) * fitted.space.length < 1e-12 * scale
-    places = np.linspace(fitted.space.lower, fitted.space.upper, 301)
-    for powers, digits in (("local", 1e-14), ("global", 1e-11)):
-        found = pieces(fitted, powers)  # type: ignore[arg-type]
-        np.testing.assert_allclose(
-            found.values(places), fitted.values(places), rtol=0, atol=digits * scale
-        )
+    fitted = dome(every=every, start_slope="0").fit
+    scale, breaks = np.abs(fitted.y).max(), fitted.space.breaks
+    assert abs(fitted.values(breaks[:1], 1)[0]) * fitted.space.length < 1e-12 * scale
+    for local, digits in ((True, 1e-14), (False, 1e-11)):
+        polynomials = pieces(fitted, local)
+        for start, end, polynomial in zip(breaks, breaks[1:], polynomials, strict=False):
+            places = np.linspace(start, end, 50)
+            found = np.polynomial.polynomial.polyval(places - local * start, polynomial)
+            expected = fitted.values(places)
+            np.testing.assert_allclose(found, expected, rtol=0, atol=digits * scale)
     # The misfit is a small part of the errors, as Table 1's finish errors are.
     assert 2e-6 < fitted.sigma < 3e-6 and scale > 78e-6
 
@@ -86,14 +80,14 @@ def test_the_dome_with_zero_slope_at_the_linear_feature(every: int) -> None:
         found = truncated_powers.powers(x, knots) @ c
         np.testing.assert_allclose(found, fitted.values(fitted.x) / scale, rtol=0, atol=bound)
         by_recursion = truncated_powers.pieces(c, knots)
-        ours = pieces(fitted, "global").coefficients * unit ** np.arange(4) / scale
+        ours = pieces(fitted, local=False) * unit ** np.arange(4) / scale
         np.testing.assert_allclose(
             ours, by_recursion, rtol=0, atol=10 * bound * np.abs(by_recursion).max()
         )
 
 
 def test_arc_length_along_both_features() -> None:
-    curve = dome(CurveSettings(boundaries=(TANGENT,), straight=(1,), end=(0.0, 0.0)))
+    curve = dome(**FEATURES, end="0 mm, 0 mm")
     assert curve.boundaries == pytest.approx((0.00127,), rel=1e-12)
     assert curve.fit.space.upper == pytest.approx(0.00127 + RADIUS * np.pi / 2, rel=1e-6)
     np.testing.assert_allclose(np.diff(curve.fit.x[1:]), RADIUS * np.radians(4.3237499), rtol=2e-5)
@@ -103,27 +97,23 @@ def test_finish_errors_follow_what_the_spline_left_of_the_semi_finish_errors() -
     """The finish cut was corrected by a spline through the semi-finish errors: their residuals show
     in it.
     """
-    curve = dome(CurveSettings(every=4, holds=(Hold("start", 1, 0.0),)))
+    curve = dome(every=4, start_slope="0")
     finish = np.array(columns(DOCUMENT)["finish_error_um"][11:], dtype=float)
     assert np.corrcoef(curve.fit.residuals, finish)[0, 1] == pytest.approx(0.67, abs=0.01)
 
 
 def test_dome_and_linear_feature_are_fitted_at_once() -> None:
-    tangent = CurveSettings(boundaries=(TANGENT,), straight=(1,))
-    curve = dome(tangent)
+    curve = dome(**FEATURES)
     boundary = np.array(curve.boundaries)
     length, scale = curve.fit.space.length, np.abs(curve.fit.y).max()
     for k in (0, 1):
         jump = curve.fit.values(boundary, k) - curve.fit.values(boundary, k, "below")
         assert abs(jump[0]) * length**k < 1e-12 * scale
     assert abs(curve.fit.values(boundary, 2)[0]) * length**2 > scale
-    level = dome(
-        CurveSettings(boundaries=(TANGENT,), straight=(1,), holds=(Hold(TANGENT, 1, 0.0),))
-    )
-    assert abs(level.fit.values(boundary, 1)[0]) * length < 1e-12 * scale
-    assert (
-        level.fit.free == curve.fit.free - 1 and level.fit.sum_of_squares > curve.fit.sum_of_squares
-    )
+    # A line that is level at its start is so at the boundary.
+    level = dome(**FEATURES, start_slope="0").fit
+    assert abs(level.values(boundary, 1)[0]) * length < 1e-12 * scale
+    assert level.free == curve.fit.free - 1 and level.sum_of_squares > curve.fit.sum_of_squares
 
 
 @pytest.mark.parametrize("variant", ["joined", "level ends", "cyclic"])

@@ -77,25 +77,6 @@ def test_a_boundary_off_the_profile_is_refused() -> None:
     assert error.value.args == (0,)
 
 
-def test_a_place_between_points_of_a_circle_is_on_its_arc() -> None:
-    """Its arc length, and the normal there, on the way up a quarter circle and down again."""
-    degrees = np.array([0.0, 3.0, 11.0, 30.0, 31.0, 60.0, 85.0])
-    asked = np.array([0.0, 1.0, 2.9, 10.0, 25.0, 30.2, 47.0, 84.0, 85.0])
-    for step in (1, -1):
-        profile, _, _ = along(dome(degrees[::step]), [""] * 7, np.zeros((0, 2)))
-        begin = degrees[::step][0]
-        for angle, place in zip(asked, dome(asked), strict=True):
-            length, normal = profile.located(place)
-            assert length == pytest.approx(RADIUS * np.radians(abs(angle - begin)), abs=1e-13)
-            outwards = [np.cos(np.radians(angle)), np.sin(np.radians(angle))]
-            np.testing.assert_allclose(normal, outwards, atol=1e-12)
-        for factor in (0.985, 1.015):
-            # Farther from the circle than a hundredth of the 29 degrees between the points.
-            aside = np.array([0.0, -RADIUS]) + factor * (dome(np.array([47.0]))[0] + [0.0, RADIUS])
-            with pytest.raises(NotOnProfileError):
-                profile.located(aside)
-
-
 def signed_curvature(one: complex, two: complex, three: complex) -> float:
     """Of the circle through three points: four times the area of the triangle over its sides."""
     first, second = two - one, three - two
@@ -122,36 +103,6 @@ def test_arcs_of_a_curve_have_the_mean_curvature_of_their_ends(backwards: bool) 
         chord = points[k + 1] - points[k]
         turn = 2.0 * np.arcsin(0.5 * abs(mean * chord))
         assert lengths[k + 1] - lengths[k] == pytest.approx(turn / abs(mean), rel=1e-12)
-        height = np.sqrt(1.0 / mean**2 - 0.25 * abs(chord) ** 2)
-        centre = points[k] + 0.5 * chord + np.sign(mean) * 1j * chord / abs(chord) * height
-        for share in (0.1, 0.5, 0.8):
-            on_arc = centre + (points[k] - centre) * np.exp(1j * np.sign(mean) * turn * share)
-            length, normal = profile.located(np.array([on_arc.imag, on_arc.real]))
-            outwards = (on_arc - centre) / abs(on_arc - centre)
-            np.testing.assert_allclose(normal, [outwards.imag, outwards.real], atol=1e-12)
-            assert length == pytest.approx(lengths[k] + share * turn / abs(mean), rel=1e-12)
-
-
-# A cylinder with a step inwards, a conical face and a part beyond: features of two and three places.
-STEPPED = np.array(
-    [[0.04, -0.05], [0.04, -0.03], [0.04, -0.02], [0.03, -0.01], [0.02, 0.0], [0.01, 0.0]]
-)
-
-
-def test_a_place_on_a_line_is_at_its_distance() -> None:
-    labels = ["cylinder"] * 3 + ["cone"] * 2 + ["tip"]
-    profile, _, _ = along(STEPPED, labels, np.zeros((0, 2)))
-    assert profile.features == ((0, 2), (3, 4), (5, 5))
-    length, normal = profile.located(np.array([0.04, -0.034]))
-    assert length == pytest.approx(0.016, abs=1e-15)
-    np.testing.assert_allclose(normal, [1.0, 0.0], atol=1e-15)
-    length, normal = profile.located(np.array([0.022, -0.002]))
-    assert length == pytest.approx(0.03 + np.sqrt(2) * 0.018, abs=1e-15)
-    np.testing.assert_allclose(normal, np.sqrt([0.5, 0.5]), atol=1e-14)
-    # Between features that share no place, beside the way, and beyond its end.
-    for place in ([0.035, -0.015], [0.015, 0.0], [0.0404, -0.034], [0.04, -0.06]):
-        with pytest.raises(NotOnProfileError):
-            profile.located(np.array(place))
 
 
 @pytest.mark.parametrize("step", [1, -1])

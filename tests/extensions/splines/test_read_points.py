@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
-from ballplate.extensions.splines.read_points import Column, choose_points, read_points
+from ballplate.extensions.splines.read_points import choose_points, read_points
 from ballplate.simulator.inputs.messages import ExperimentError
-
-from tests.extensions.splines import wording
 
 
 @pytest.fixture
@@ -26,142 +23,55 @@ def told(path: Path, text: str, x: str | None = None, y: str | None = None) -> l
 
 
 def test_an_abscissa_and_an_error(write: Path) -> None:
-    write.write_text("# laser\nposition_mm,EXX_um,note\n0,0,start\n 250,0.8,\n", encoding="utf-8")
+    write.write_text("# laser\nposition_mm,EXX_um\n0,0\n 250,0.8\n", encoding="utf-8")
     points = read_points(write)
-    assert (
-        points.x is not None
-        and points.x.tolist() == [0.0, 0.25]
-        and points.y.tolist() == [0.0, 8e-7]
-    )
-    assert points.names == ("1", "2") and points.places is None and points.uncertainties is None
-    assert (
-        points.x_column == Column("position", "mm", 1e-3, "length")
-        and points.y_column.words == "EXX"
-    )
+    assert points.x is not None and points.places is None
+    assert points.x.tolist() == [0.0, 0.25] and points.y.tolist() == [0.0, 8e-7]
+    assert points.names == ("1", "2") and (points.x_name, points.y_name) == ("position", "EXX")
 
 
-def test_a_profile_an_uncertainty_and_a_choice_of_errors(write: Path) -> None:
-    write.write_text(
-        "point,x_mm,z_in,first_um,second_um,u_nm\na,1,1,2,3,50\nb,2,1,2,4,60\n", encoding="utf-8"
-    )
+def test_a_profile_and_a_choice_of_errors(write: Path) -> None:
+    header = "point,feature,nominal_x_mm,nominal_z_in,first_um,second_um"
+    write.write_text(f"{header}\na,cone,1,1,,3\nb,face,2,1,2,4\n", encoding="utf-8")
     points = read_points(write, y="second_um")
-    assert points.x is None and points.x_column == Column("arc_length", "mm", 1e-3, "length")
-    assert points.places is not None and points.places.tolist() == [
-        [0.001, 0.0254],
-        [0.002, 0.0254],
-    ]
-    np.testing.assert_allclose(points.uncertainties, [5e-8, 6e-8])
-    assert points.names == ("a", "b") and points.y.tolist() == [3e-6, 4e-6]
-    along_z = read_points(write, x="z", y="first")
+    assert points.x is None and points.x_name == "arc_length" and points.places is not None
+    assert points.places.tolist() == [[0.001, 0.0254], [0.002, 0.0254]]
+    assert points.names == ("a", "b") and points.features == ("cone", "face")
+    assert points.y.tolist() == [3e-6, 4e-6]
+    along_z = read_points(write, x="nominal_z", y="second")
     assert along_z.x is not None and along_z.x.tolist() == [0.0254, 0.0254]
-    assert told(write, write.read_text(encoding="utf-8")) == [
-        wording.SEVERAL_COLUMNS_MAY_BE_THE_ERROR
-    ]
-
-
-def test_normals_of_the_drawing(write: Path) -> None:
-    write.write_text(
-        "x_mm,z_mm,error_um,normal_x,normal_z\n1,1,2,3,4\n2,1,2,-1,0\n", encoding="utf-8"
-    )
-    points = read_points(write)
-    assert points.normals is not None
-    np.testing.assert_allclose(points.normals, [[0.6, 0.8], [-1.0, 0.0]])
-    np.testing.assert_allclose(points.chosen([1]).normals, [[-1.0, 0.0]])
-    assert told(write, "x_mm,z_mm,error_um,normal_x,normal_z\n1,1,2,0,0\n2,1,2,a,1\n") == [
-        wording.AND_ARE_NOT,
-        wording.IS_NOT_A_NUMBER_WRITE,
-    ]
-    assert told(write, "x_mm,z_mm,error_um,normal_x\n1,1,2,0\n") == [wording.A_NORMAL_HAS_TWO]
-
-
-def test_rows_with_mistakes_are_told_all_at_once(write: Path) -> None:
-    text = "point,position_mm,error_um,u_um\n1,0,1,0.1\n1,1,x,0.1\n3,2,,0.1\n4,3\n5,4,1,0\n6,5,2,1e30\n"
-    assert told(write, text) == [
-        wording.IS_NOT_A_NUMBER,
-        wording.A_SECOND_POINT_AS_IN_LINE,
-        wording.NO_ERROR_WRITE,
-        (wording.COLUMNS_INSTEAD_OF_WRITE_ONE_LINE),
-        wording.IS_NOT_A_STANDARD,
-        (wording.IS_BEYOND_WHAT_CAN_BE_COMPUTED),
-    ]
+    (several,) = told(write, write.read_text(encoding="utf-8"))
+    assert several.endswith("may be the error: first, second; choose one with --y")
 
 
 @pytest.mark.parametrize(
     ("text", "x", "y", "message"),
     [
-        (
-            "",
-            None,
-            None,
-            "data.csv: the file is empty; its first line should be position_mm,error_um",
-        ),
-        ("position_mm|error_um\n", None, None, "there is an error but no abscissa"),
-        (
-            "position,error_um\n1,2\n",
-            None,
-            None,
-            "there is an error but no abscissa; position has no unit",
-        ),
-        (
-            "position_mm,error\n1,2\n",
-            None,
-            None,
-            "there is an error but no abscissa; error has no unit",
-        ),
-        ("position_mm\n1\n", None, None, "there is an error but no abscissa"),
-        (
-            "position,error\n1,2\n",
-            None,
-            None,
-            "no column is left for the error; its name needs a unit",
-        ),
-        ("a_mm,b_um,c_um\n1,2,3\n", None, "d", 'no column "d" for --y; known: a, b, c'),
-        (
-            "a_mm,error,c_um\n1,2,3\n",
-            None,
-            "error",
-            'the column "error" has no unit of length or angle',
-        ),
-        ("a_mm,b_um\n1,2\n", "b", "b", "b is chosen for x and for y"),
+        ("", None, None, "data.csv: the file is empty; its first line should be position_mm,"),
+        ("position,error_um\n1,2\n", None, None, "abscissa and error are two columns whose names"),
+        ("position_mm\n1\n", None, None, "abscissa and error are two columns whose names"),
+        ("a_mm,b_um\n1,2\n", "b", "b", "abscissa and error are two columns whose names"),
+        ("a_mm,b_um,c_um\n1,2,3\n", None, "d", 'no column "d" with a unit of length for --y'),
         ("a_mm,b_um\n1,2\n", "arc_length", "b", "the arc length needs a profile"),
-        ("a_mm,a_um\n1,2\n", None, None, 'a second column "a_um"; remove one'),
-        ("a_mm,b_um,u_urad\n1,2,3\n", None, None, "the uncertainty is an angle and b a length"),
-        ("a_mm,b_um\n", None, None, "no rows below the names of the columns"),
+        ("a_mm,b_um,note\n1,2,3\n", None, None, 'data.csv:1:11: unknown column "note"'),
+        ("a_mm,b_um\n1,2\n3,x\n", None, None, 'data.csv:3:3: "x" is not a number'),
+        ("point,a_mm,b_um\n1,1,2\n1,2,2\n", None, None, 'data.csv:3:1: a second point "1"'),
     ],
 )
 def test_files_that_cannot_be_used(
     write: Path, text: str, x: str | None, y: str | None, message: str
 ) -> None:
-    found = told(write, text, x, y)
-    assert len(found) == 1 and message in found[0]
-
-
-def test_decimals_and_separators_of_two_kinds_are_told(write: Path) -> None:
-    assert told(write, 'position_mm,error_um\n10,2.0\n30,4,11\n40,"5,3"\n50;6\n60,7;8\n') == [
-        (wording.COLUMNS_INSTEAD_OF_IF_A_COMMA),
-        'data.csv:4:4: "5,3" has a decimal comma; write 5.3',
-        wording.COLUMNS_INSTEAD_OF_SEPARATE_THEM,
-        wording.IS_NOT_A,
-    ]
-
-
-def test_an_experiment_is_no_table(tmp_path: Path) -> None:
-    path = tmp_path / "mine.yml"
-    path.write_text("title: t\n", encoding="utf-8")
-    with pytest.raises(ExperimentError, match=wording.THIS_IS_YAML):
-        read_points(path)
+    (found,) = told(write, text, x, y)
+    assert message in found
 
 
 def test_points_by_name(write: Path) -> None:
     write.write_text(
-        "point,a_mm,b_um\n" + "".join(f"{k},1,0\n" for k in (1, 2, 3, 7, "end")), encoding="utf-8"
+        "point,a_mm,b_um\n" + "".join(f"{k},1,0\n" for k in (1, 2, "b-1", 7, "end")), "utf-8"
     )
     points = read_points(write)
     assert choose_points(points, "2-7", "data.csv") == [1, 2, 3]
-    assert choose_points(points, "end, 1,2-3", "data.csv") == [0, 1, 2, 4]
-    with pytest.raises(ExperimentError) as error:
-        choose_points(points, "4-6, enf, 1", "data.csv")
-    assert [message.text for message in error.value.messages] == [
-        'no points "4-6"; known: 1, 2, 3, 7, end',
-        wording.NO_POINT_DID_YOU_MEAN,
-    ]
+    assert choose_points(points, "end, 1,b-1", "data.csv") == [0, 2, 4]
+    for text, name in (("1-6", "6"), ("enf, 1", "enf"), ("-7", "-7")):
+        with pytest.raises(ExperimentError, match=f'data.csv: no point "{name}"'):
+            choose_points(points, text, "data.csv")

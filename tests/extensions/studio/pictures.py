@@ -35,15 +35,12 @@ def main(folder: Path) -> None:
 
 # In one piece: the steps of the tour in the documentation, in its order.
 def tour(page, folder: Path, design: Path) -> None:
-    def picture(name: str, part: str | None = None) -> None:
+    def picture(name: str) -> None:
         # The pointer hides nothing, and what is still asked for has come.
         page.mouse.move(620, 5)
         page.wait_for_timeout(1200)
-        shot = page.locator(part).screenshot() if part else page.screenshot()
-        small(shot, folder / f"studio-{name}.webp")
+        small(page.screenshot(), folder / f"studio-{name}.webp")
 
-    until(page, "document.querySelector('#rests').textContent !== ''")
-    picture("verdict", "#answer")
     for name in ("z high", "x low", "x high", "y high"):
         page.click(f"[aria-label='read {name}']")
         place = f"window.studio.state().design.scene.positions.find((one) => one.name === {name!r})"
@@ -70,19 +67,6 @@ def tour(page, folder: Path, design: Path) -> None:
     page.click("#details summary")
     picture("drag")
     page.click("#details summary")
-    page.click("#position [aria-label='r3c3']")
-    settled(page, revision + 2)
-    picture("position")
-    page.click("#forms summary >> text=/^machine$/")
-    field = page.locator('#forms input[data-path=\'["machine","repeatability"]\']')
-    field.fill("0.2 furlongs")
-    field.press("Enter")
-    page.wait_for_selector("#forms .field-error")
-    page.locator("#forms .field-error").scroll_into_view_if_needed()
-    picture("form")
-    page.click("#undo")
-    settled(page, revision + 4)
-    page.click("#forms summary >> text=/^machine$/")
     page.click("[data-job=next]")
     page.wait_for_selector("#suggestions li")
     page.evaluate("window.scrollTo(0, 0)")

@@ -4,10 +4,9 @@ from pathlib import Path
 
 import pytest
 from ballplate.designs import shipped
-from ballplate.extensions.studio.actions import ACTIONS, ActionError, done
+from ballplate.extensions.studio.actions import ActionError, done
 from ballplate.extensions.studio.document import (
     ChangedOnDiskError,
-    changed,
     experiment_of,
     opened,
     redone,
@@ -42,12 +41,6 @@ def test_steps_back_and_forward_lead_through_the_same_texts(design):
         document = redone(document)
         assert document.text == text
     assert redone(document) is document and not document.is_saved
-
-
-def test_a_change_after_steps_back_forgets_the_steps_forward(design):
-    document = undone(changed(opened(design), "title: other\n"))
-    assert document.forward
-    assert not changed(document, "title: third\n").forward
 
 
 def test_saving_writes_the_text_and_keeps_mark_and_permissions(design):
@@ -102,15 +95,6 @@ def test_a_move_changes_the_place_alone_and_keeps_comments(design):
         if a != b
     ]
     assert len(lines) == 1 and "name: z low" in lines[0][0]
-
-
-def test_four_quarter_turns_are_none(design):
-    before = document = opened(design)
-    for _ in range(4):
-        document = done(document, {"do": "turn", "position": "x high"})
-    old, new = (experiment_of(one).positions[3].pose for one in (before, document))
-    assert new.origin == pytest.approx(old.origin, abs=1e-9)
-    assert (new.rotation == old.rotation).all()
 
 
 def test_standing_across_another_axis_keeps_the_middle(design):
@@ -172,7 +156,3 @@ def test_a_text_that_is_wrong_is_kept_and_told_with_its_line(design):
         experiment_of(document)
     assert told.value.messages[0].line == 2
     assert undone(document).is_saved
-
-
-def test_every_action_has_a_sentence_of_what_it_does():
-    assert all((work.__doc__ or "").strip().endswith(".") for work in ACTIONS.values())

@@ -83,16 +83,6 @@ def test_escape_takes_a_drag_back(page) -> None:
     assert page.evaluate("window.studio.state().text") == before
 
 
-def test_a_drop_without_movement_does_nothing(page) -> None:
-    pulled(page, (0.1, 0.05, 0.0))
-    page.mouse.move(*spot(page, middle(page)))
-    page.mouse.up()
-    pulled(page, (0.002, 0.0, 0.0))
-    page.mouse.up()
-    assert calls(page, "onDrop") == []
-    assert page.evaluate("window.studio.state().revision") == 0
-
-
 def test_a_plate_stops_at_the_wall_and_is_red_beyond_it(page) -> None:
     # Its balls are from 0 to 700 mm along y and from 0 along x, less the probe's offset.
     extent = page.evaluate(
@@ -155,25 +145,6 @@ def test_one_finger_drags_a_plate_and_a_second_one_leaves_it(page) -> None:
         fingers("touchMove", (x + 10 * k, y + 20))
     fingers("touchEnd")
     assert page.evaluate(EYE)[1] != eye[1]
-
-
-def test_a_cancelled_pointer_leaves_the_plate(page) -> None:
-    fingers = Fingers(page)
-    x, y = spot(page, middle(page))
-    fingers("touchStart", (x, y))
-    fingers("touchMove", (x + 30, y + 8))
-    fingers("touchMove", (x + 40, y + 12))
-    assert page.evaluate(PLACE)[0] != [0, 0, 0]
-    fingers("touchCancel")
-    until(page, "window.studio.view.hands.offset('z low').every((one) => one === 0)")
-    assert calls(page, "onDrop") == []
-    # And the next one drags as before.
-    fingers("touchStart", (x, y))
-    fingers("touchMove", (x + 30, y + 8))
-    fingers("touchMove", (x + 40, y + 12))
-    fingers("touchEnd")
-    settled(page, 1)
-    assert len(calls(page, "onDrop")) == 1
 
 
 def test_a_place_is_asked_for_on_the_floor(page) -> None:

@@ -113,18 +113,6 @@ def test_the_hours_of_the_first_page_are_those_of_the_plan(tmp_path: Path) -> No
         assert page.errors == []
 
 
-def test_an_uncertainty_that_is_stated_as_constant_does_not_grow(tmp_path: Path) -> None:
-    with Studio(tmp_path) as studio, tab() as page:
-        page.goto(studio.address)
-        page.wait_for_selector("#draft dd >> text=u = 0.2 µm + 0.25 µm/m")
-        page.fill("#answer-certificate-0", "0,5")
-        page.wait_for_selector("#draft dd >> text=/^u = 0.25 µm$/")
-        assert page.get_attribute("#answer-certificate-1", "placeholder") == ""
-        page.fill("#answer-certificate-0", "")
-        page.wait_for_selector("#draft dd >> text=u = 0.2 µm + 0.25 µm/m")
-        assert page.errors == []
-
-
 def test_nothing_of_one_file_stays_over_another(design: Path, tmp_path: Path) -> None:
     (tmp_path / "other.yaml").write_text(TEXT.replace("0.2 um", "0.3 um"), encoding="utf-8")
     with Studio(design) as studio, tab() as page:

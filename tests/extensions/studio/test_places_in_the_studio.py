@@ -9,9 +9,7 @@ from pathlib import Path
 import ballplate as bp
 import numpy as np
 import pytest
-from ballplate.cli import main
 from ballplate.designs import shipped
-from ballplate.simulator.experiment import Position, load
 
 pytest.importorskip("starlette", reason="the studio is an extra")
 
@@ -99,38 +97,3 @@ def test_a_plate_too_large_is_drawn_and_reported(document: DesignDocument) -> No
     assert large.scene is not None and len(large.scene["positions"]) == 6
     problems = [place["problem"] for place in large.scene["positions"]]
     assert all("there is no room along" in problem for problem in problems)
-
-
-POOL = """
-pool:
-  candidates:
-    - {planes: [z], levels: [low, high], corners: {x: [low, high], y: high}, probes: [down]}
-  limits: {keep: [z low], edge: 10 mm, reach: {down: {x: [50 mm, 900 mm]}}}
-"""
-
-
-def test_plans_are_written_in_lengths_without_their_pool(tmp_path: Path) -> None:
-    """The pool's edge and reach, which a plan does without, change no place."""
-    text = TEXT.replace("[750 mm, 750 mm]", "[400 mm, 400 mm]")
-    text = text.replace("expected_rank_deficiency: 0", "")
-    path = tmp_path / "pool.yaml"
-    path.write_text(text + POOL, encoding="utf-8")
-    written = tmp_path / "plan.yaml"
-    assert main(["plan", str(path), "--hours", "30", "-o", str(written)]) == 0
-    lines = written.read_text(encoding="utf-8")
-    section = lines[lines.index("positions:") : lines.index("calibration:")]
-    assert not any(word in section for word in ("x: low", "x: high", "level: low", "%"))
-    planned = bp.load(written)
-    (pooled,) = load(path, planning=True)
-    assert pooled.pool is not None
-    items = [candidate.item for candidate in pooled.pool.candidates]
-    pool_origins = {item.name: item.pose.origin for item in items if isinstance(item, Position)}
-    for place in planned.positions:
-        origin = pool_origins[place.description or place.name]
-        np.testing.assert_allclose(place.pose.origin, origin, atol=1e-12)
-
-
-def test_run_sheets_state_lengths() -> None:
-    sheet = str(bp.sheet(shipped("quickstart.yaml")))
-    assert "across z at z = 250 mm; lower corner at x = 0 mm, y = 0 mm" in sheet
-    assert not any(word in sheet for word in ("= low", "= high", "%", "2/9"))

@@ -4,7 +4,6 @@ browser.
 
 from __future__ import annotations
 
-import statistics
 import subprocess
 import sys
 from pathlib import Path
@@ -184,76 +183,6 @@ def test_an_hour(design: Path) -> None:
 
 
 @pytest.mark.long
-def test_twenty_moves_of_seven_by_seven_balls_are_answered(design: Path) -> None:
-    text = Path(shipped("quickstart.yaml")).read_text()
-    design.write_text(text.replace("balls: [5, 5]", "balls: [7, 7]"))
-    with Studio(design) as studio, tab() as page:
-        page.goto(studio.address)
-        until(page, "!!window.studio?.state()?.design")
-        first = page.evaluate("window.studio.state()")
-        page.click("#positions button.name >> nth=0")
-        page.evaluate("performance.clearResourceTimings()")
-        engine, states = [], []
-        for k in range(20):
-            page.focus("#view")
-            page.keyboard.press("PageUp" if k % 2 == 0 else "PageDown")
-            states.append(settled(page, first["revision"] + k + 1))
-            engine.append(1e3 * states[-1]["design"]["seconds"])
-        answered = page.evaluate(
-            "performance.getEntriesByType('resource').filter(one => one.name.endsWith('/api/do'))"
-            ".map(one => one.duration)"
-        )
-        assert len(answered) == 20 and page.errors == []
-        # Two moves undo one another; each is answered with figures of its own.
-        for state in states[1::2]:
-            assert state["text"] == first["text"]
-            assert state["design"]["quantities"] == first["design"]["quantities"]
-        moved = states[0]["design"]["quantities"]
-        assert moved != first["design"]["quantities"]
-        design.write_text(states[0]["text"])
-        assert moved[0]["average"] == bp.run(design).quantities["U6"].average
-    print(
-        f"median of twenty moves: answered {statistics.median(answered):.0f} ms,"
-        f" engine {statistics.median(engine):.0f} ms"
-    )
-
-
-@pytest.mark.long
-def test_a_sweep_over_two_axes_is_stopped_and_its_page_opened(design: Path) -> None:
-    with Studio(design) as studio, tab() as page:
-        page.goto(studio.address)
-        until(page, "!!window.studio?.state()?.design")
-
-        def sweep(values: str) -> None:
-            page.click("#sweep")
-            page.fill("[data-axis=values]", values)
-            page.fill(
-                "[data-axis=paths] >> nth=1", "artefacts.plate.size[0], artefacts.plate.size[1]"
-            )
-            page.fill("[data-axis=values] >> nth=1", "600 mm; 750 mm")
-            page.click("#compute")
-
-        sweep("; ".join(f"{k} nm" for k in range(100, 600)))
-        page.wait_for_selector("#jobs li[data-state=running] >> text=of 1000 cases")
-        page.click("#jobs button >> text=stop")
-        until(page, "!document.querySelector('#jobs li')")
-        sweep("0.1 um; 0.2 um; 0.4 um")
-        page.wait_for_selector("#jobs li:not([data-state=running])", timeout=200_000)
-        assert page.locator("[data-page]").count() == 1, page.inner_text("#jobs")
-        assert page.locator("#jobs tbody tr").count() == 6
-        assert "rank deficiency" in page.inner_text("#jobs thead")
-        with page.context.expect_page() as opened:
-            page.click("[data-page]")
-        swept = opened.value
-        failures = []
-        swept.on("console", lambda said: failures.append(said.text))
-        swept.on("pageerror", lambda error: failures.append(str(error)))
-        swept.reload()
-        assert "6 of 6 cases done" in swept.inner_text("body")
-        assert failures == [] and page.errors == []
-
-
-@pytest.mark.long
 def test_the_keyboard_is_enough(design: Path) -> None:
     """Who works without a mouse stays where he was, though parts of the page are made anew."""
     with Studio(design) as studio, tab() as page:
@@ -298,123 +227,6 @@ def test_the_keyboard_is_enough(design: Path) -> None:
         assert page.evaluate(at).startswith("The volume")
         state = press("Control+s")
         assert state["saved"] and page.errors == []
-
-
-def test_a_machine_of_its_own_from_an_empty_folder(tmp_path: Path) -> None:
-    """A machine of 1200 x 900 x 700 mm that meets 0.9 + L/400 µm (L in mm), by the browser alone."""
-    design = tmp_path / "machine.yaml"
-    actions = 0
-    with Studio(design) as studio, tab() as page:
-        page.goto(studio.address)
-        page.click("#begin-example")
-        until(page, "!!window.studio?.state()?.design")
-
-        def fill(path: str, value: str) -> None:
-            nonlocal actions
-            field = page.locator(f"#forms [data-path='{path}']")
-            revision = page.evaluate("window.studio.state().revision")
-            field.fill(value)
-            field.press("Enter")
-            settled(page, revision + 1)
-            actions += 1
-
-        for section in ("machine", "artefacts", "positions", "target uncertainty", "title"):
-            page.click(f"#forms summary >> text=/^{section}$/")
-            actions += 1
-        fill('["title"]', "plate in a machine of 1200 x 900 x 700 mm")
-        fill('["artefacts","plate","size"]', "[500 mm, 500 mm]")
-        fill('["machine","volume"]', "[1200 mm, 900 mm, 700 mm]")
-        places = {
-            1: {"level": "550 mm", "corner,x": "650 mm", "corner,y": "350 mm"},
-            2: {"corner,y": "50 mm"},
-            3: {"level": "950 mm", "corner,y": "350 mm", "corner,z": "150 mm"},
-            4: {"corner,x": "50 mm"},
-            5: {"level": "650 mm", "corner,z": "150 mm", "corner,x": "650 mm"},
-        }
-        for k, changes in places.items():
-            for key, value in changes.items():
-                steps = ",".join(f'"{step}"' for step in key.split(","))
-                fill(f'["positions",{k},{steps}]', value)
-        fill('["target_uncertainty"]', "(0.9 + L/400) um with L in mm")
-        page.keyboard.press("Control+s")
-        actions += 1
-        until(page, "window.studio.state().saved")
-        assert page.errors == []
-        page.screenshot(path=str(tmp_path / "machine.png"))
-    assert actions <= 60
-    prediction = bp.run(design)
-    assert prediction.verdict.deficiency == 0
-    assert prediction.quantities["U6"].within_target == 1.0
-    volume = prediction.design.machine.volume
-    assert (volume.upper - volume.lower).tolist() == [1.2, 0.9, 0.7]
-    print(f"{actions} actions")
-
-
-def test_a_design_begins_with_the_questions_of_init(tmp_path: Path) -> None:
-    """From an empty folder, with the keyboard alone: wrong answers, the draft, and Save."""
-    with Studio(tmp_path) as studio, tab(1240, 900) as page:
-        page.goto(studio.address)
-        page.wait_for_selector("#draft dl")
-        at = "document.activeElement.value || document.activeElement.id"
-        assert page.evaluate(at) == "moving bridge"
-        page.keyboard.press("ArrowDown")
-        page.keyboard.press("ArrowDown")
-        page.keyboard.press("ArrowDown")
-        assert page.evaluate(at) == "cantilever"
-
-        def answer(question: str, *values: str) -> None:
-            for k, value in enumerate(values):
-                for _ in range(60):
-                    if page.evaluate("document.activeElement.id") == f"answer-{question}-{k}":
-                        break
-                    page.keyboard.press("Tab")
-                page.keyboard.press("Control+a")
-                page.keyboard.type(value)
-
-        answer("volume", "500", "4oo", "300")
-        assert not page.is_visible("#error-plate")
-        answer("plate", "4", "4", "420")
-        page.wait_for_selector("#error-volume >> text='\"4oo\" is no number'")
-        page.keyboard.press("Enter")
-        # The first of what cannot be used has the focus, with its message.
-        until(page, "document.activeElement.id === 'answer-volume-1'")
-        assert page.locator("#begin-form input:invalid").count() == 1
-        described = page.get_attribute("#answer-volume-1", "aria-describedby")
-        assert "error-volume" in described.split()
-        answer("volume", "500", "400", "300")
-        page.wait_for_selector("#error-plate >> text=larger than the volume")
-        # A page that is loaded again has the answers still.
-        page.reload()
-        until(page, "!!document.querySelector('#error-plate')?.textContent")
-        assert page.input_value("#answer-volume-1") == "400" and page.evaluate(at) == "cantilever"
-        answer("plate", "4", "4", "200")
-        answer("temperature", "0.1")
-        answer("hours", "4")
-        page.wait_for_selector("#draft dd >> text=0.1 K")
-        until(page, "document.querySelector('#begin-form').checkValidity()")
-        assert page.evaluate(OUTSIDE) == [] and not list(tmp_path.iterdir())
-        page.keyboard.press("Enter")
-        page.wait_for_selector("#begin", state="hidden")
-        state = settled(page, 1)
-        assert not state["saved"] and wording.A_DRAFT_NOT_SAVED in page.inner_text("#notice")
-        assert "Full rank" in page.inner_text("#verdict")
-        page.keyboard.press("Control+s")
-        until(page, "window.studio.state().saved")
-        # Later, another design begins beside it.
-        page.click("#new")
-        page.wait_for_selector("#begin")
-        assert page.input_value("#begin-name") == "design-2.yaml"
-        page.click("#begin-back")
-        page.wait_for_selector("#begin", state="hidden")
-        assert page.errors == []
-    stated = {"machine-type": "cantilever", "volume": "500 400 300 mm", "hours": "4"}
-    stated |= {"mpe": "0.9 um + L/400", "certificate": "0.4 um + 0.5 um/m, k=2", "tips": "star"}
-    stated |= {"plate": "4 x 4, 200 mm", "temperature": "0.1 K"}
-    written = (tmp_path / "design.yaml").read_bytes()
-    command = [sys.executable, "-m", "ballplate", "init", "design.yaml", "--force"]
-    command += [word for name, text in stated.items() for word in (f"--{name}", text)]
-    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
-    assert (tmp_path / "design.yaml").read_bytes() == written
 
 
 @pytest.mark.parametrize("width", [390, 1024, 1440])

@@ -220,43 +220,6 @@ def test_what_was_kept_before_the_folder_was_full_is_no_promise(design, monkeypa
     assert session.state()["recoverable"]
 
 
-def test_a_file_that_cannot_be_opened_costs_nothing_of_what_is_not_saved(design, monkeypatch):
-    design.with_name("other.yaml").write_bytes(design.read_bytes())
-    session = Session(design)
-    session.act({"do": "turn", "position": "z low"})
-    text = session.state()["text"]
-
-    def fail(*_):
-        raise MemoryError
-
-    monkeypatch.setattr("ballplate.extensions.studio.folder.opened", fail)
-    with pytest.raises(MemoryError):
-        session.act({"do": "open", "name": "other.yaml", "discard": True})
-    assert session.state()["text"] == text
-    assert json.loads(kept_in(design).read_text())["text"] == text
-
-
-def test_after_a_refused_save_the_last_words_say_where_the_changes_are(design):
-    session = Session(design)
-    session.act({"do": "turn", "position": "z low"})
-    design.write_bytes(design.read_bytes() + b"# another hand\n")
-    with pytest.raises(RefusedError, match=wording.HAS_CHANGED_ON_DISK):
-        session.act({"do": "save"})
-    assert unsaved(session).startswith(wording.CHANGES_ARE_NOT_SAVED)
-
-
-def test_a_folder_that_cannot_be_written_keeps_nothing_and_stops_nobody(design, monkeypatch):
-    def fail(*_, **__):
-        raise PermissionError(13, "Permission denied")
-
-    monkeypatch.setattr("ballplate.extensions.studio.recovery.write_files", fail)
-    session = Session(design)
-    session.act({"do": "turn", "position": "z low"})
-    state = session.state()
-    assert state["back"] == 1 and not state["recoverable"] and not kept_in(design).exists()
-    assert wording.COULD_NOT_BE_KEPT in unsaved(session)
-
-
 def test_a_folder_that_is_not_there_is_told(tmp_path):
     with pytest.raises(ExperimentError, match="no such folder"):
         Session(tmp_path / "nowhere" / "plate.yaml", beginning="title: x\n")
@@ -369,14 +332,6 @@ def test_what_was_not_saved_brings_no_model_in_python_into_a_file(design, ran, c
     assert "not restored" in state["note"] and state["saved"]
     (aside,) = set_aside(design)
     assert json.loads(aside.read_text())["text"] == text and not ran.exists()
-
-
-@pytest.mark.parametrize("change", [in_python, by_variant])
-def test_a_text_that_runs_a_model_is_one_that_would_have_been_found(design, ran, change):
-    """The test above can fail: these files run the model when they are named."""
-    design.write_text(change(design.read_text()))
-    Session(design).state()
-    assert ran.exists()
 
 
 def test_what_was_not_saved_does_not_exchange_the_model_in_python_of_a_file(design, ran):

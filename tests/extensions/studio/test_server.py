@@ -6,14 +6,13 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import ballplate as bp
-import numpy as np
 import pytest
 import yaml
 from ballplate.designs import shipped
 
 pytest.importorskip("starlette", reason="the studio is an extra")
 
-from ballplate.extensions.maps.length_map import length_map, length_settings
+from ballplate.extensions.maps.length_map import length_map
 from ballplate.extensions.studio.server import application
 from ballplate.extensions.studio.session import RefusedError, Session
 from ballplate.results.checked_designs import predict
@@ -199,12 +198,6 @@ def test_errors_by_positions_are_those_of_run(client, design):
     assert without["positions"] == found["positions"]
 
 
-def test_a_design_without_lengths_has_no_assumptions(client):
-    for name in ("x low", "x high", "y low", "y high"):
-        client.post("/api/do", json={"do": "remove", "position": name})
-    assert client.get("/api/later").json()["assumptions"] is None
-
-
 def test_a_change_in_another_window_is_not_lost(client):
     state = client.get("/api/state").json()
     turn = {"do": "turn", "position": "z low", "revision": state["revision"]}
@@ -213,16 +206,6 @@ def test_a_change_in_another_window_is_not_lost(client):
     assert "another window" in refused["error"] and refused["outdated"]
     unknown = {**turn, "do": "nothing", "revision": state["revision"] + 1}
     assert client.post("/api/do", json=unknown).json()["outdated"] is False
-
-
-def test_saving_over_what_another_program_wrote_is_refused(client, design):
-    client.post("/api/do", json={"do": "turn", "position": "z low"})
-    design.write_bytes(design.read_bytes() + b"# another hand\n")
-    answer = client.post("/api/do", json={"do": "save"}).json()
-    assert wording.HAS_CHANGED_ON_DISK in answer["error"]
-    assert design.read_bytes().endswith(b"# another hand\n")
-    answer = client.post("/api/do", json={"do": "save", "name": "mine.yaml"}).json()
-    assert answer["file"] == "mine.yaml" and answer["saved"]
 
 
 def test_a_request_is_limited_though_its_length_is_not_stated(client, monkeypatch, session):
@@ -246,9 +229,7 @@ def test_a_request_is_limited_though_its_length_is_not_stated(client, monkeypatc
     assert client.post("/api/do", json={"do": "undo"}).status_code == 200
 
 
-@pytest.mark.parametrize(
-    "value", [".nan", ".inf", '"\\ud800"', "2026-11-22", "0x1F", "!!binary aGk="]
-)
+@pytest.mark.parametrize("value", [".nan", '"\\ud800"', "2026-11-22", "!!binary aGk="])
 def test_whatever_a_text_says_the_state_is_an_answer(client, value):
     text = client.get("/api/state").json()["text"]
     for old, new in (
@@ -370,35 +351,23 @@ def test_a_sweep_that_is_stopped_leaves_nothing_among_temporary_files(
     assert list(folder.iterdir()) == []
 
 
-def test_a_wrong_text_keeps_the_figures_with_what_is_wrong(client):
-    before = client.get("/api/state").json()["design"]["quantities"]
-    action = {"do": "set", "path": ["machine", "repeatability"], "value": "0.2 furlongs"}
-    answer = client.post("/api/do", json=action).json()
-    (message,) = answer["messages"]
-    assert message["path"] == "machine.repeatability" and message["line"] > 0
-    assert answer["design"]["quantities"] == before
-    assert client.post("/api/do", json={"do": "undo"}).json()["messages"] == []
-
-
 @pytest.mark.parametrize("body", ["[]", "{", '"x"', '{"do": ["move"]}', '{"do": {"a": 1}}'])
 def test_what_is_no_action_is_answered_with_an_error(client, body):
     answer = client.post("/api/do", content=body, headers={"Content-Type": "application/json"})
     assert answer.status_code in (200, 400) and answer.json()["error"]
 
 
-def test_the_map_of_lengths_is_that_of_run(client, design):
+def test_the_map_of_lengths_is_that_of_the_page(client, design):
     found = client.post("/api/drawn", json={"map": "lengths", "motion": 0}).json()
     assert found["motions"] is None
     (experiment,) = load(design)
-    lengths = length_map(experiment, length_settings(experiment, grid=(9, 9, 3)))
+    lengths = length_map(experiment, (9, 9, 3))
     drawn = found["map"]
     assert drawn["scale"]["unit"] == "missed"
-    groups = lengths.by_point
-    assert drawn["scale"]["largest"] == pytest.approx(groups.maximum_ratio.max())
-    missed = 1.0 - groups.within_target / groups.count
+    assert drawn["scale"]["largest"] == pytest.approx(lengths.maximum_ratio.max())
     shares = {
         tuple(point): share
-        for point, share in zip(lengths.points.round(9).tolist(), missed, strict=True)
+        for point, share in zip(lengths.points.round(9).tolist(), lengths.missed, strict=True)
     }
     for level in drawn["slices"]:
         for y, row in zip(drawn["y"], level["values"], strict=True):
@@ -419,67 +388,6 @@ def test_the_map_of_lengths_is_that_of_run(client, design):
     assert client.post("/api/drawn", json={"map": ""}).json()["map"] is None
 
 
-def test_a_preview_is_small(tmp_path):
-    """Twenty positions that leave much undetermined: twenty kilobytes at most."""
-    lines = Path(shipped("quickstart.yaml")).read_text().splitlines(keepends=True)
-    names = ("z high", "x low", "x high", "y low", "y high")
-    kept = [line for line in lines if not any(f"name: {name}," in line for name in names)]
-    (at,) = (k for k, line in enumerate(kept) if "name: z low" in line)
-    kept[at:at] = [
-        kept[at].replace("z low", f"z {k}").replace("30 %", f"{250 + 20 * k} mm")
-        for k in range(1, 20)
-    ]
-    path = tmp_path / "twenty.yaml"
-    path.write_text("".join(kept))
-    session = Session(path)
-    try:
-        found = session.view("preview", {"do": "move", "position": "z low", "by": [0.01, 0.0, 0.0]})
-        assert found["rank"]["deficiency"] > 10 and len(found["scene"]["positions"]) == 20
-        assert len(json.dumps(found)) <= 20_000
-    finally:
-        session.close()
-
-
-@pytest.mark.parametrize(
-    "file, variant",
-    [
-        ("npl/6.1.1.yaml", "B"),
-        ("certified/deficient.yaml", None),
-        ("planning/campaign.yaml", None),
-    ],
-)
-def test_what_is_undetermined_moves_a_plate_in_the_same_way_wherever_it_stands(file, variant):
-    """A change that no reading shows deforms a plate as a body: the length between two of its balls
-    changes by as much in one position as in another, though the machine moves otherwise there.
-    """
-    session = Session(Path(shipped(file)), variant)
-    design = session.state()["design"]
-    positions, directions = design["scene"]["positions"], design["rank"]["directions"]
-    found = [k for k, one in enumerate(directions) if not one["weak"]]
-    assert len(found) == design["rank"]["deficiency"] > 0
-    for k in found:
-        motions = session.view("drawn", {"map": "", "motion": k})["motions"]
-        direction = motions["direction"]
-        assert np.linalg.norm(direction["nodes"] + direction["readings"], axis=1).max() <= 1.0002
-        seen = {}
-        for position, ball, by in zip(
-            motions["position"], motions["ball"], direction["readings"], strict=True
-        ):
-            seen.setdefault(positions[position]["artefact"], {}).setdefault(position, {})[ball] = by
-        for artefact in seen.values():
-            changes = []
-            for position, moved in artefact.items():
-                places = np.array(positions[position]["balls"])
-                balls = sorted(moved)
-                by = np.array([moved[ball] for ball in balls])
-                apart = places[balls][:, None] - places[balls][None]
-                lengths = np.linalg.norm(apart, axis=2) + np.eye(len(balls))
-                changes.append(((by[:, None] - by[None]) * apart).sum(axis=2) / lengths)
-            for one in changes[1:]:
-                # Displacements are rounded to a ten-thousandth of the largest.
-                assert np.abs(one - changes[0]).max() < 5e-4
-
-
 @pytest.mark.slow
 def test_suggestions_are_what_the_file_becomes(client, design):
     client.post("/api/do", json={"do": "remove", "position": "y low"})
@@ -491,16 +399,6 @@ def test_suggestions_are_what_the_file_becomes(client, design):
     answer = client.post("/api/do", json={"do": "add", "settings": best["settings"]}).json()
     lengths = next(one for one in answer["design"]["quantities"] if one["symbol"] == "U6")
     assert lengths["average"] == pytest.approx(best["average"], rel=1e-12)
-
-
-@pytest.mark.slow
-def test_a_computation_is_stopped(client):
-    client.post("/api/start", json={"job": "monte carlo", "settings": {"trials": 500_000}})
-    started = time.monotonic()
-    while "of" not in client.get("/api/jobs").json()[0]["step"]:
-        assert time.monotonic() - started < 120
-        time.sleep(0.05)
-    assert client.post("/api/stop", json={"id": 1}).json() == []
 
 
 @pytest.mark.slow

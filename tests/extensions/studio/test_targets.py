@@ -11,7 +11,7 @@ pytest.importorskip("starlette", reason="the studio is an extra")
 
 from ballplate.extensions.studio.actions import done
 from ballplate.extensions.studio.document import DesignDocument
-from ballplate.extensions.studio.judging import VIEWS, judgement, previewed
+from ballplate.extensions.studio.judging import VIEWS, judgement
 from ballplate.simulator.computing import unreported
 
 TEXT = Path(shipped("quickstart.yaml")).read_text(encoding="utf-8")
@@ -92,13 +92,6 @@ def test_a_measuring_task_misses_its_own_target():
         answer = judgement(found).answer
         assert answer["met"] == word and answer["within"] == 1.0
         assert answer["shares"][1].startswith(f"{share} of the measuring tasks")
-
-
-def test_a_preview_judges_the_plates_as_they_are_moved():
-    away = {"do": "off", "position": "y high"}
-    turned = {"do": "turn", "position": "y high"}
-    assert previewed(with_values(target_uncertainty="0.33 um"), away)["met"] == "missed"
-    assert previewed(document(), turned)["met"] == "met"
 
 
 def test_hours_are_those_of_the_order_of_least_change_over():

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from contextlib import closing
 from html.parser import HTMLParser
 from itertools import product
 from pathlib import Path
 from typing import Any
 
+from ballplate.extensions.sweeps.result import SweepResult
+from ballplate.extensions.sweeps.running import stored_result
 from ballplate.extensions.sweeps.store import Store, add_rows, add_sweep, open_store
 from ballplate.extensions.sweeps.task import CellResult
 
@@ -52,8 +55,14 @@ def made_up(
         "seed": 1,
         "record": list(record),
     }
-    add_rows(store, add_sweep(store, definition, []), rows)
+    add_rows(store, add_sweep(store, definition), rows)
     return store
+
+
+def made_up_result(path: Path, *arguments: Any, **options: Any) -> SweepResult:
+    """The sweep of a made-up store."""
+    with closing(made_up(path, *arguments, **options)) as store:
+        return stored_result(store)
 
 
 def done(cell: int, figures: dict[str, float], **details: Any) -> CellResult:
@@ -106,8 +115,3 @@ class Page(HTMLParser):
     def of(self, tag: str) -> list[dict[str, str]]:
         """Attributes of all elements of a kind."""
         return [attributes for name, attributes in self.tags if name == tag]
-
-    @property
-    def places(self) -> list[dict[str, str]]:
-        """Attributes of the places of tables that hold a cell's figure."""
-        return [attributes for attributes in self.of("td") if "data-cell" in attributes]

@@ -1,5 +1,5 @@
 """Whatever stands in the place of a store, or in it: one line that says so, and what can be read is
-not lost.
+exported.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import sqlite3
 import tempfile
 from pathlib import Path
 
+import ballplate as bp
 import numpy as np
 import pandas
 import pytest
@@ -33,7 +34,6 @@ from tests.extensions.sweeps.odd_stores import (
     DAMAGED,
     NO_STORES,
     by_sql,
-    page_of,
     settled,
     signed,
 )
@@ -41,6 +41,10 @@ from tests.extensions.sweeps.support import assert_same, rows, small_sweep
 from tests.reference.tables import read_table
 
 NO_TIME = ["duration_s"]
+
+# What no digest covers: the duration, text that is none, and rows that are gone as if they had
+# never been written, which are computed again.
+HARMLESS = ("seconds a text", "seconds infinite", "no keys", "no definition")
 
 
 @pytest.fixture(scope="module")
@@ -78,7 +82,7 @@ def commands(store: Path, *kinds: str) -> list[list[str]]:
                 "-o",
                 str(folder / f"report.{name}"),
             ]
-            for name in ("html", "text", "markdown", "latex")
+            for name in ("html", "text")
         },
     }
     return [every[kind] for kind in kinds or every]
@@ -110,35 +114,33 @@ def test_what_is_no_store_is_refused_in_one_line(
 
 
 @pytest.mark.parametrize("name", DAMAGED)
-def test_what_can_be_read_of_a_damaged_store_is_right(
+def test_a_damaged_store_is_refused_and_its_sound_cases_exported(
     name: str, store: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """And the file stays as it is, unless the database is sound and cells are computed anew."""
+    """And the file stays as it is."""
     right = rows(store)
     DAMAGED[name](store)
     damaged = store.read_bytes()
-    for arguments in commands(store, "csv", "text"):
-        status = main(arguments)
-        out, err = capsys.readouterr()
-        assert status in (0, 3) and out == ""
-        if status or err:
-            assert_told_in_lines(err, store)
+    status = main(commands(store, "csv")[0])
+    out, err = capsys.readouterr()
+    assert status in (0, 3) and out == ""
+    if status:
+        assert_told_in_lines(err, store)
     table = store.parent / "table.csv"
     if table.exists():
         assert_subset(read_table(table), right)
-    assert store.read_bytes() == damaged
-    # Computed anew, or refused.
-    status = main(commands(store, "sweep")[0])
-    out, err = capsys.readouterr()
-    if status == 3:
-        assert out == ""
-        assert_told_in_lines(err, store)
+        assert status == 3 or name in HARMLESS or len(read_table(table)) < 4
+    for arguments in commands(store, "text", "html", "sweep"):
+        status = main(arguments)
+        out, err = capsys.readouterr()
+        if name in HARMLESS:
+            assert status in (0, 1) or wording.IT_HAS_NONE in err
+        else:
+            assert status == 3 and out == "" and err.count("\n") == 1
+            assert_told_in_lines(err, store)
+    if name not in HARMLESS:
         # But for SQLite's header, which says how it writes.
         assert store.read_bytes()[100:] == damaged[100:]
-    else:
-        assert status == 1 and "4 cases" in out and "2 done, 2 failed" in out
-        assert "Traceback" not in err
-        assert_same(rows(store), right)
 
 
 def assert_subset(table: pandas.DataFrame, right: pandas.DataFrame) -> None:
@@ -157,20 +159,6 @@ def as_texts(column: pandas.Series) -> list[str]:
     return ["" if pandas.isna(value) else str(value) for value in column]
 
 
-def test_names_of_tables_that_are_no_text(store: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """SQLite quotes them in what it says, as they are."""
-    content = store.read_bytes()
-    assert b"CREATE TABLE result" in content
-    store.write_bytes(
-        content.replace(b"CREATE TABLE result", b"CREATE TABLX\xf1result").replace(
-            b"resultresult", b"resu\xf1tresult"
-        )
-    )
-    for arguments in commands(store):
-        assert main(arguments) == 3
-        assert_told_in_lines(capsys.readouterr().err, store)
-
-
 def test_digests_notice_one_bit(store: Path, capsys: pytest.CaptureFixture[str]) -> None:
     connection = sqlite3.connect(store)
     (figures,) = connection.execute("SELECT figures FROM result WHERE rowid = 2").fetchone()
@@ -179,16 +167,13 @@ def test_digests_notice_one_bit(store: Path, capsys: pytest.CaptureFixture[str])
     place = content.index(figures[:64])
     store.write_bytes(content[:place] + bytes([content[place] ^ 1]) + content[place + 1 :])
     assert main(commands(store, "csv")[0]) == 3
-    err = capsys.readouterr().err
-    assert wording.UNREADABLE_CELL_ITS_CONTENT in err
+    assert wording.UNREADABLE_CELL_ITS_CONTENT in capsys.readouterr().err
     assert read_table(store.parent / "table.csv")["cell"].tolist() == [0, 2, 3]
-    assert main(commands(store, "html")[0]) == 3
-    page = (store.parent / "report.html").read_text(encoding="utf-8")
-    assert wording.UNREADABLE in page
-    capsys.readouterr()
-    assert main(commands(store, "sweep")[0]) == 1
-    captured = capsys.readouterr()
-    assert wording.UNREADABLE_CELL in captured.err and wording.OF_THEM_BEFORE in captured.out
+    for arguments in commands(store, "html", "sweep"):
+        assert main(arguments) == 3
+        assert wording.IS_DAMAGED in capsys.readouterr().err
+    with pytest.raises(StoreError, match="sweep --export reads the undamaged cases"):
+        bp.stored(store)
 
 
 def many(path: Path, count: int) -> Store:
@@ -211,7 +196,7 @@ def many(path: Path, count: int) -> Store:
         )
         for k in range(count)
     )
-    add_rows(store, add_sweep(store, definition, []), made_up)
+    add_rows(store, add_sweep(store, definition), made_up)
     return store
 
 
@@ -242,11 +227,6 @@ def test_all_but_the_rows_of_the_damaged_pages_survive(
     assert (table["U4_average_m"] == table["cell"] / 7).all() and (
         table["k"] == table["cell"]
     ).all()
-    assert (
-        main(["sweep", "--report", str(path), "--format", "text", "-o", str(tmp_path / "t.txt")])
-        == 3
-    )
-    assert "unreadable" in (tmp_path / "t.txt").read_text() or len(table) > 200
 
 
 def test_a_report_of_nothing_done_says_so(store: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -258,20 +238,6 @@ def test_a_report_of_nothing_done_says_so(store: Path, capsys: pytest.CaptureFix
         out, err = capsys.readouterr()
         assert out == "" and err.count("\n") == 1 and wording.OF_CELLS_DONE in err
         assert_told_in_lines(err, store)
-
-
-def test_a_damaged_file_is_kept_and_its_cells_are_computed_under_another_name(
-    store: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    right = rows(store)
-    page_of("text")(store)
-    damaged = store.read_bytes()
-    assert main(commands(store, "sweep")[0]) == 3
-    assert wording.NAME_A_NEW_FILE in capsys.readouterr().err
-    other = store.with_name("other.sqlite")
-    assert main([*commands(store, "sweep")[0], "--store", str(other)]) == 1
-    assert_same(rows(other), right)
-    assert store.read_bytes() == damaged
 
 
 @pytest.mark.parametrize("what", ["deleted", "replaced", "moved", "a pipe"])
@@ -309,27 +275,6 @@ def test_a_store_that_vanishes_while_a_sweep_runs(
     if what == "moved":
         # With all rows that were computed before.
         assert rows(store.with_name("elsewhere.sqlite"))["cell"].tolist() == [0, 1]
-
-
-def test_a_store_that_vanishes_at_the_end_is_not_called_done(
-    store: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    from ballplate.extensions.sweeps import execute
-
-    with monkeypatch.context() as patched:
-        real = execute.run_sweep
-        patched.setattr(
-            "ballplate.extensions.sweeps.running.run_sweep",
-            lambda *a, **o: _gone(real(*a, **o), store),
-        )
-        assert main(commands(store, "sweep")[0]) == 3
-    out, err = capsys.readouterr()
-    assert out == "" and wording.WAS_DELETED in err
-
-
-def _gone(found: object, store: Path) -> object:
-    store.unlink()
-    return found
 
 
 def test_another_process_that_writes_is_told(
@@ -418,110 +363,6 @@ def test_text_of_a_store_is_escaped(store: Path, capsys: pytest.CaptureFixture[s
     assert "<script" not in (store.parent / "report.html").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "../../out.yaml",
-        "/tmp/out.yaml",
-        "C:out.yaml",
-        "C:\\out.yaml",
-        "a\0b",
-        "",
-        ".",
-        "x" * 300,
-        "quickstart.yaml/in",
-    ],
-)
-def test_names_of_files_in_a_store_lead_nowhere(
-    name: str, store: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    before = {path for path in store.parent.parent.rglob("*")}
-    connection = sqlite3.connect(store)
-    connection.execute("INSERT INTO bundle (sweep, path, content) VALUES (1, ?, x'00')", [name])
-    connection.commit()
-    connection.close()
-    signed(store)
-    assert main(commands(store, "html")[0]) == 0
-    page = (store.parent / "report.html").read_text(encoding="utf-8")
-    assert wording.THE_STORE_CANNOT_BE_TRUSTED in page or "cannot be unpacked" in page
-    assert {path for path in store.parent.parent.rglob("*")} - before <= {
-        store.parent / "report.html"
-    }
-
-
-@pytest.mark.parametrize("where", ["base", "axis", "machine"])
-@pytest.mark.parametrize("target", ["/dev/zero", "../../../../../../etc/passwd", "~/x.csv"])
-def test_a_report_reads_no_file_outside_the_store(where: str, target: str, store: Path) -> None:
-    connection = sqlite3.connect(store)
-    files = dict(connection.execute("SELECT path, content FROM bundle").fetchall())
-    base, sweep = files["quickstart.yaml"].decode(), files["small.yaml"].decode()
-    if where == "base":
-        base = base.replace(
-            "{random: 200, seed: 1}",
-            f"{{file: {target}}}",
-        )
-        assert target in base
-    elif where == "axis":
-        sweep = sweep.replace(
-            "axes:\n", f"axes:\n  f: {{path: artefacts.plate.file, values: ['{target}', b.csv]}}\n"
-        )
-    else:
-        machine = f"tables: {{file: '{target}'}}\n"
-        connection.execute(
-            "INSERT INTO bundle (sweep, path, content) VALUES (1, 'm.yaml', ?)", [machine.encode()]
-        )
-    for name, text in (("quickstart.yaml", base), ("small.yaml", sweep)):
-        connection.execute(
-            "UPDATE bundle SET content = ?, digest = NULL WHERE path = ?", [text.encode(), name]
-        )
-    connection.commit()
-    connection.close()
-    signed(store)
-    assert main(commands(store, "html")[0]) == 0
-    page = (store.parent / "report.html").read_text(encoding="utf-8")
-    words = {
-        "base": (
-            "outside the folder that files are read from here",
-            "~/x.csv: there is no such file",
-        ),
-        "axis": (
-            "the stored files make other cases than those stored",
-            "outside the folders of the sweep",
-        ),
-        # What nothing names is not read.
-        "machine": ("</svg>",),
-    }
-    drawn = page[page.index('id="designs"') :]
-    assert any(one in drawn for one in words[where])
-
-
-@pytest.mark.parametrize("kind", ["csv", "parquet", "html", "text", "markdown", "latex"])
-def test_no_code_of_a_store_is_run(kind: str, store: Path) -> None:
-    mark = store.parent / "ran"
-    code = f"open({str(mark)!r}, 'w')\n".encode()
-    connection = sqlite3.connect(store)
-    (base,) = connection.execute(
-        "SELECT content FROM bundle WHERE path = 'quickstart.yaml'"
-    ).fetchone()
-    model = b"error_model: {kind: python, object: 'evil:build'}\n"
-    base = re.sub(rb"error_model:\n(  .*\n)+", model, base)
-    assert model in base
-    connection.execute(
-        "UPDATE bundle SET content = ?, digest = NULL WHERE path = 'quickstart.yaml'", [base]
-    )
-    for name in ("evil.py", "sitecustomize.py", "conftest.py"):
-        connection.execute(
-            "INSERT INTO bundle (sweep, path, content) VALUES (1, ?, ?)", [name, code]
-        )
-    connection.commit()
-    connection.close()
-    signed(store)
-    assert main(commands(store, kind)[0]) == 0
-    assert not mark.exists()
-    if kind == "html":
-        assert "add --run-modules" in (store.parent / "report.html").read_text(encoding="utf-8")
-
-
 def flipped(store: Path, chance: random.Random) -> None:
     """Change some bits somewhere."""
     content = bytearray(store.read_bytes())
@@ -562,12 +403,4 @@ def test_flipped_bits(made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[
     right = rows(made / "small.sqlite")
     seen = {assert_survives(made, tmp_path, seed, right) for seed in range(40)}
     assert {"csv 0", "csv 3", "sweep 1", "sweep 3"} <= seen
-    assert "Traceback" not in capsys.readouterr().err
-
-
-@pytest.mark.long
-def test_many_flipped_bits(made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    right = rows(made / "small.sqlite")
-    seen = [assert_survives(made, tmp_path, 1000 + seed, right) for seed in range(4000)]
-    assert seen.count("csv 3") > 100
     assert "Traceback" not in capsys.readouterr().err

@@ -19,11 +19,6 @@ def test_names_in_a_bundle_are_those_of_posix(top: str) -> None:
     assert sorted(posix.values()) == sorted(names)
 
 
-def test_case_of_drives_and_folders_makes_no_difference() -> None:
-    paths = [PureWindowsPath("C:\\Plan\\sweep.yaml"), PureWindowsPath("c:\\plan\\Tables\\x.csv")]
-    assert list(names_of(paths).values()) == ["Tables/x.csv", "sweep.yaml"]
-
-
 def test_files_on_two_drives_have_no_names() -> None:
     paths: list[PurePath] = [
         PureWindowsPath("C:/plan/sweep.yaml"),

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from ballplate.cli import main
 from ballplate.extensions.sweeps.fingerprint import fingerprint
 from ballplate.simulator.experiment.loading import load
 
@@ -40,11 +39,6 @@ ITEM = """  - kind: python
     options: {{one: r1c1, other: r3c3}}
     standard_uncertainty: 0.1 um
 """
-SWEEP = """title: two repeatabilities
-base: plate.yaml
-axes:
-  noise: {path: machine.repeatability, values: [0.2 um, 0.4 um]}
-"""
 
 
 @pytest.fixture
@@ -58,13 +52,7 @@ def folder(tmp_path: Path) -> Path:
     text = text.replace("calibration:\n", f"calibration:\n{ITEM.format(module=module)}")
     (tmp_path / "plate.yaml").write_text(text, encoding="utf-8")
     (tmp_path / f"{module}.py").write_text(MODULE, encoding="utf-8")
-    (tmp_path / "sweep.yaml").write_text(SWEEP, encoding="utf-8")
     return tmp_path
-
-
-def test_a_sweep_computes_its_cells(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["sweep", str(folder / "sweep.yaml"), "--workers", "1", "-q"]) == 0
-    assert "2 done, 0 failed" in capsys.readouterr().out
 
 
 def test_keys_tell_what_the_functions_are(folder: Path) -> None:

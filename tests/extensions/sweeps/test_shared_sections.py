@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import re
 from pathlib import Path
 
@@ -11,11 +10,8 @@ import pandas
 import pytest
 from ballplate.extensions.sweeps.fingerprint import fingerprint
 from ballplate.extensions.sweeps.load import experiment_of, load_sweep
-from ballplate.simulator.experiment import structure
 from ballplate.simulator.experiment.loading import load
-from ballplate.simulator.inputs.messages import ExperimentError
 
-from tests.extensions.sweeps import wording
 from tests.extensions.sweeps.support import ROOT, small_sweep
 from tests.reference.copies import copy_tree
 
@@ -35,27 +31,6 @@ def test_cells_are_what_files_of_their_own_say(tmp_path: Path) -> None:
             (own,) = load(path)
             assert fingerprint(experiment_of(sweep, number)) == fingerprint(own)
     assert load(path)[0].layouts["plate"].coordinates.max() == pytest.approx(0.7)
-
-
-def test_a_wrong_cell_is_wrong_each_time(tmp_path: Path) -> None:
-    sweep = load_sweep(small_sweep(tmp_path, 3))
-    told = []
-    for _ in range(2):
-        with pytest.raises(ExperimentError) as error:
-            experiment_of(sweep, 5)
-        told.append(str(error.value))
-        experiment_of(sweep, 0)
-    assert told[0] == told[1] and wording.ABOVE_THE_MEASURING_VOLUME in told[0]
-
-
-def test_what_is_shared_goes_with_the_file(tmp_path: Path) -> None:
-    gc.collect()
-    before = len(structure._VALID)
-    found = load_sweep(small_sweep(tmp_path, 3)), load(tmp_path / "quickstart.yaml")
-    assert len(structure._VALID) > before
-    del found
-    gc.collect()
-    assert len(structure._VALID) == before
 
 
 def test_an_experiment_stays_when_a_file_that_it_names_has_changed(tmp_path: Path) -> None:

@@ -1,20 +1,30 @@
-"""Sweeps on a real scheduler with two worker processes on this machine."""
+"""Sweeps on a real scheduler and workers of this machine; a cluster that cannot be used, or not any
+longer, is told in one line.
+"""
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 import pytest
 from ballplate.cli import main
-from ballplate.extensions.sweeps import cluster as cluster_of_workers
+from ballplate.extensions.sweeps import cluster
+from ballplate.extensions.sweeps.cluster import (
+    ClusterError,
+    OtherVersionError,
+    _on_worker,
+)
+from ballplate.extensions.sweeps.task import CellTask
 
+from tests.extensions.sweeps import wording
 from tests.extensions.sweeps.support import (
     ROOT,
     assert_same,
@@ -25,72 +35,147 @@ from tests.extensions.sweeps.support import (
     stored,
 )
 
-READY = """
-import sys
-from distributed import Client
-with Client(scheduler_file=sys.argv[1], timeout=60) as client:
-    client.wait_for_workers(2, timeout=60)
-    print(client.scheduler.address)
+Start = Callable[..., subprocess.Popen[bytes]]
+
+# One with another version.
+OTHER = """
+import importlib.metadata
+real = importlib.metadata.version
+importlib.metadata.version = lambda name: "0.0.7" if name == "ballplate" else real(name)
+"""
+# One with the same version but other code.
+OTHER_CODE = """
+import ballplate.extensions.sweeps.cluster
+ballplate.extensions.sweeps.cluster.code_digest = lambda: "other"
+"""
+SERVE = """
+import asyncio, sys
+from distributed import Worker
+async def serve():
+    async with Worker(sys.argv[1], nthreads=1, dashboard=False) as worker:
+        await worker.finished()
+asyncio.run(serve())
 """
 
 
 @pytest.fixture
-def cluster(tmp_path: Path) -> Iterator[tuple[str, subprocess.Popen[bytes]]]:
-    """Address of a scheduler, and the process that looks after its two workers."""
-    with (tmp_path / "log").open("wb") as log:
-        file = tmp_path / "scheduler.json"
-        temporary = tmp_path / "temporary"
-        temporary.mkdir()
-        quiet: dict[str, Any] = {
-            "stdout": log,
-            "stderr": log,
-            "cwd": ROOT,
-            "start_new_session": True,
-            "env": {**os.environ, "TMPDIR": str(temporary)},
-        }
-        arguments = [
-            "--host",
-            "127.0.0.1",
-            "--port",
-            "0",
-            "--no-dashboard",
-            "--scheduler-file",
-            str(file),
-        ]
-        scheduler = subprocess.Popen(
-            [sys.executable, "-m", "distributed.cli.dask_scheduler", *arguments], **quiet
-        )
-        options = [
-            "--scheduler-file",
-            str(file),
-            "--nworkers",
-            "2",
-            "--nthreads",
-            "1",
-            "--no-dashboard",
-        ]
-        options += ["--local-directory", str(tmp_path)]
-        workers = subprocess.Popen(
-            [sys.executable, "-m", "distributed.cli.dask_worker", *options], **quiet
-        )
-        try:
-            end = time.monotonic() + 60
-            while not file.exists():
-                assert time.monotonic() < end and scheduler.poll() is None
-                time.sleep(0.1)
-            # In a process of its own, whose threads and sockets end with it.
-            ready = subprocess.run(
-                [sys.executable, "-c", READY, str(file)],
-                capture_output=True,
-                text=True,
-                timeout=120,
+def start(tmp_path: Path) -> Iterator[Start]:
+    processes = []
+
+    def begin(*arguments: str) -> subprocess.Popen[bytes]:
+        with (tmp_path / "log").open("ab") as log:
+            process = subprocess.Popen(
+                [sys.executable, *arguments],
+                stdout=log,
+                stderr=log,
+                cwd=ROOT,
+                start_new_session=True,
             )
-            assert ready.returncode == 0, ready.stderr
-            yield ready.stdout.strip(), workers
-        finally:
-            for process in (workers, scheduler):
-                os.killpg(process.pid, signal.SIGKILL)
-                process.wait()
+        processes.append(process)
+        return process
+
+    yield begin
+    for process in reversed(processes):
+        with suppress(ProcessLookupError):
+            os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+
+
+@pytest.fixture
+def scheduler(tmp_path: Path, start: Start) -> tuple[str, subprocess.Popen[bytes]]:
+    """Address and process of a scheduler without workers."""
+    file = tmp_path / "scheduler.json"
+    options = [
+        "--host",
+        "127.0.0.1",
+        "--port",
+        "0",
+        "--no-dashboard",
+        "--scheduler-file",
+        str(file),
+    ]
+    process = start("-m", "distributed.cli.dask_scheduler", *options)
+    end = time.monotonic() + 60
+    # The file may be there before its content.
+    while not (file.exists() and file.read_text(encoding="utf-8")):
+        assert time.monotonic() < end and process.poll() is None
+        time.sleep(0.05)
+    return json.loads(file.read_text(encoding="utf-8"))["address"], process
+
+
+def ended(path: Path, address: str) -> str:
+    """What a sweep that ends with status 3 says."""
+    arguments = command("sweep", path, "--scheduler", address)
+    done = subprocess.run(arguments, cwd=ROOT, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 3 and done.stdout == "" and done.stderr.count("\n") == 1, done.stderr
+    return done.stderr
+
+
+@pytest.mark.parametrize(
+    ("worker", "words"),
+    [
+        (OTHER, "ballplate 0.0.7"),
+        (OTHER_CODE, "other code of ballplate 0.1.0"),
+    ],
+    ids=["another version", "other code"],
+)
+def test_workers_with_other_code_are_refused(
+    worker: str,
+    words: str,
+    tmp_path: Path,
+    scheduler: tuple[str, subprocess.Popen[bytes]],
+    start: Start,
+) -> None:
+    address, _ = scheduler
+    start("-c", worker + SERVE, address)
+    err = ended(small_sweep(tmp_path, 2), address)
+    assert (
+        f" has {words}, and this is ballplate 0.1.0; install the same ballplate on every worker"
+        in err
+    )
+    assert err.startswith("the worker tcp://127.0.0.1:")
+    assert stored(tmp_path / "small.sqlite") == 0
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_ends(
+    tmp_path: Path, scheduler: tuple[str, subprocess.Popen[bytes]], start: Start
+) -> None:
+    address, process = scheduler
+    start("-c", SERVE, address)
+    path, store = small_sweep(tmp_path, 100, "trials: 50\n"), tmp_path / "small.sqlite"
+    arguments = command("sweep", path, "--scheduler", address)
+    with subprocess.Popen(
+        arguments, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as sweep:
+        end = time.monotonic() + 100
+        while sweep.poll() is None and stored(store) < 2 and time.monotonic() < end:
+            time.sleep(0.02)
+        process.kill()
+        out, err = sweep.communicate(timeout=100)
+    last = err.splitlines()[-1]
+    assert sweep.returncode == 3 and "Traceback" not in err and out == "", err
+    assert last.startswith(f"the scheduler at {address} has ended; finished cases are stored"), err
+    assert 2 <= stored(store) < 200
+
+
+def test_no_worker(
+    tmp_path: Path, scheduler: tuple[str, subprocess.Popen[bytes]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from distributed import Client
+
+    monkeypatch.setattr(cluster, "PATIENCE", 0.2)
+    with (
+        cluster._quiet(),
+        Client(scheduler[0], set_as_default=False) as client,
+        pytest.raises(ClusterError, match=wording.THE_CLUSTER_HAS_NO_WORKERS),
+    ):
+        cluster._check_versions(client)
+
+
+def test_a_worker_that_comes_later_computes_nothing_with_other_code() -> None:
+    with pytest.raises(OtherVersionError):
+        _on_worker(cluster.Bundle("", "", ()), "other", CellTask(0))
 
 
 def worker_processes(nannies: int) -> list[int]:
@@ -101,9 +186,18 @@ def worker_processes(nannies: int) -> list[int]:
 
 @pytest.mark.slow
 def test_a_cluster_gives_the_same_rows_even_if_a_worker_dies(
-    tmp_path: Path, cluster: tuple[str, subprocess.Popen[bytes]]
+    tmp_path: Path,
+    scheduler: tuple[str, subprocess.Popen[bytes]],
+    start: Start,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    address, workers = cluster
+    address, _ = scheduler
+    temporary = tmp_path / "temporary"
+    temporary.mkdir()
+    monkeypatch.setenv("TMPDIR", str(temporary))
+    options = ["--nworkers", "2", "--nthreads", "1", "--no-dashboard"]
+    options += ["--local-directory", str(tmp_path)]
+    workers = start("-m", "distributed.cli.dask_worker", address, *options)
     path = small_sweep(tmp_path, 8, "trials: 16\n")
     assert run("sweep", path, "--workers", 1, "--store", tmp_path / "alone.sqlite").returncode == 1
     arguments = command("sweep", path, "--scheduler", address)
@@ -124,13 +218,13 @@ def test_a_cluster_gives_the_same_rows_even_if_a_worker_dies(
     assert "Traceback" not in err
     assert_same(rows(tmp_path / "small.sqlite"), rows(tmp_path / "alone.sqlite"))
     # What is unpacked is in the folders of the workers, which dask deletes whatever ends them.
-    assert not list((tmp_path / "temporary").glob("ballplate-*"))
+    assert not list(temporary.glob("ballplate-*"))
 
 
 def test_no_scheduler(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(cluster_of_workers, "CONNECTION_TIMEOUT", 1)
+    monkeypatch.setattr(cluster, "CONNECTION_TIMEOUT", 1)
     address = "tcp://127.0.0.1:1"
     assert main(["sweep", str(small_sweep(tmp_path, 2)), "--scheduler", address]) == 3
     err = capsys.readouterr().err

@@ -9,14 +9,16 @@ import sqlite3
 import subprocess
 from pathlib import Path
 
+import ballplate as bp
 import numpy as np
-import pandas
 import pytest
 from ballplate.cli import main
-from ballplate.extensions.sweeps.fingerprint import METHOD, fingerprint
+from ballplate.extensions.sweeps import store_file
+from ballplate.extensions.sweeps.answer import answer
+from ballplate.extensions.sweeps.fingerprint import fingerprint
 from ballplate.extensions.sweeps.load import experiment_of, load_sweep
 from ballplate.extensions.sweeps.model import Sweep
-from ballplate.extensions.sweeps.store import definitions, files, keys, open_store, results
+from ballplate.extensions.sweeps.store import definitions, keys, open_store, results
 from ballplate.extensions.sweeps.task import BLOCK, CellResult, CellTask, compute
 from ballplate.montecarlo.experiments import trials
 from ballplate.results.checked_designs import predict
@@ -24,7 +26,6 @@ from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 
 from tests.extensions.sweeps import wording
-from tests.extensions.sweeps.odd_stores import signed
 from tests.extensions.sweeps.support import (
     ROOT,
     assert_same,
@@ -33,7 +34,6 @@ from tests.extensions.sweeps.support import (
     run,
     small_sweep,
 )
-from tests.reference.copies import copy_file
 
 
 def sweep(path: Path, *options: str) -> int:
@@ -86,72 +86,44 @@ def test_a_second_run_computes_nothing(
     )
 
 
-def made_by_the_first_method(path: Path) -> None:
-    """Make of a store one of the first method, whose keys are the fingerprints alone; its figures
-    are 17.
-    """
-    connection = sqlite3.connect(path, isolation_level=None)
-    for table in ("cell", "result"):
-        assert connection.execute(
-            f"UPDATE {table} SET key = substr(key, instr(key, ' ') + 1)"
-        ).rowcount
-    for key, figures in connection.execute("SELECT key, figures FROM result").fetchall():
-        wrong = np.full(len(figures) // 8, 17.0, "<f8").tobytes()
-        connection.execute("UPDATE result SET figures = ? WHERE key = ?", [wrong, key])
-    connection.close()
-    signed(path)
-
-
-def test_rows_of_an_earlier_method_are_computed_anew_and_told(
+def test_a_store_of_an_earlier_format_is_read_but_not_continued(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    path, store = small_sweep(tmp_path, 2, "trials: 50\n"), tmp_path / "small.sqlite"
-    assert sweep(path) == 1
-    right = rows(store)
-    made_by_the_first_method(store)
-    capsys.readouterr()
-
-    # Still to be read, with a warning.
-    assert main(["sweep", "--export", str(store), "-o", str(tmp_path / "old.csv")]) == 0
-    told = "4 rows were computed by method 1, before corrections to lengths of standards"
-    assert told in capsys.readouterr().err
-    old = pandas.read_csv(tmp_path / "old.csv")
-    assert (old["U6_average_m"].dropna() == 17.0).all() and len(old) == 4
-
-    assert sweep(path) == 1
-    captured = capsys.readouterr()
-    assert (
-        told in captured.err
-        and f"this version computes by method {METHOD}; replaced in this run" in captured.err
-    )
-    assert captured.out == f"{store}: 4 cases, 2 done, 2 failed\n"
-    # With the same seeds, so that only what was corrected differs.
-    assert_same(rows(store), right)
-
-    assert main(["sweep", "--export", str(store), "-o", str(tmp_path / "new.csv")]) == 0
-    assert sweep(path) == 1
-    assert "method" not in capsys.readouterr().err
-
-
-def test_an_interrupted_run_leaves_no_rows_of_two_methods(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
     path, store = small_sweep(tmp_path, 2), tmp_path / "small.sqlite"
-    sweep(path)
+    assert sweep(path) == 1
     right = rows(store)
-    made_by_the_first_method(store)
-
-    def second_fails(loaded: Sweep, task: CellTask) -> CellResult:
-        if task.block == 0 and task.number == 1:
-            raise KeyboardInterrupt
-        return compute(loaded, task)
-
-    with monkeypatch.context() as patched:
-        patched.setattr("ballplate.extensions.sweeps.local.compute", second_fails)
-        assert sweep(path) == 130
-    assert_same(rows(store), right[:1].reset_index(drop=True))
-    sweep(path)
+    connection = sqlite3.connect(store)
+    connection.execute(store_file.FILES)
+    connection.execute("INSERT INTO bundle (sweep, path, content) VALUES (1, 'a.yaml', x'00')")
+    connection.execute("UPDATE about SET value = ?", [store_file.EARLIER])
+    connection.commit()
+    connection.close()
+    before = store.read_bytes()
     assert_same(rows(store), right)
+    capsys.readouterr()
+    assert main(["sweep", "--export", str(store), "-o", "-"]) == 0
+    assert capsys.readouterr().out.count("\n") == 5
+    assert sweep(path) == 3
+    assert wording.AN_EARLIER_VERSION in capsys.readouterr().err
+    assert store.read_bytes() == before
+
+
+def test_assumptions_are_assessed_for_the_best_case(tmp_path: Path) -> None:
+    path, store = small_sweep(tmp_path, 2, "record: [U6]\n"), tmp_path / "small.sqlite"
+    text = (tmp_path / "quickstart.yaml").read_text(encoding="utf-8")
+    assumed = "assumptions: {temperature: 5 K}\n"
+    (tmp_path / "quickstart.yaml").write_text(text + assumed, encoding="utf-8")
+    assert sweep(path) == 1
+    table = rows(store)
+    best = answer(bp.stored(store)).case
+    given = [
+        one.given
+        for one in predict(experiment_of(load_sweep(path), best)).qualifications
+        if one.kind == "assumption"
+    ]
+    assert given
+    expected = {best: f"{' and '.join(given)} (assessed for the best case only)"}
+    assert [expected.get(cell, "") for cell in table["cell"]] == table["given"].tolist()
 
 
 def test_failed_cells_are_tried_again_when_asked(tmp_path: Path) -> None:
@@ -242,30 +214,6 @@ def test_what_two_sweeps_share_is_computed_once(
     assert sorted(task.number for task in done if task.block == 0) == [2, 3, 4, 5]
 
 
-def test_the_store_holds_all_files_that_it_needs(tmp_path: Path) -> None:
-    path = small_sweep(tmp_path, 2)
-    copy_file("tests/extensions/sweeps/balls.csv", tmp_path)
-    text = (tmp_path / "quickstart.yaml").read_text(encoding="utf-8")
-    plate = "{kind: grid, balls: [5, 5], size: [750 mm, 750 mm]}"
-    text = text.replace(plate, "{kind: balls, file: balls.csv}").replace(
-        "corner sides ", "[[a, b], [b, c]]  "
-    )
-    (tmp_path / "quickstart.yaml").write_text(text, encoding="utf-8")
-    path.write_text(
-        "title: t\nbase: quickstart.yaml\naxes: {a: {path: seed, values: [1, 2]}}\n",
-        encoding="utf-8",
-    )
-    assert sweep(path) == 0
-    store = open_store(tmp_path / "small.sqlite")
-    assert [name for name, _ in files(store, 1)] == ["balls.csv", "quickstart.yaml", "small.yaml"]
-    assert "undetermined" in results(store, 1, 4).rows[0].details
-    store.close()
-    (tmp_path / "balls.csv").write_text(
-        "ball,x_mm,y_mm\na,0,0\nb,700,0\nc,700,650\nd,0,650\n", encoding="utf-8"
-    )
-    assert sweep(path) == 3
-
-
 def test_replicates_in_blocks_are_the_same_replicates(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -296,7 +244,6 @@ def test_replicates_in_blocks_are_the_same_replicates(
         ("seed: 7", "seed: 8", True),
         ("0.2 um ", "0.21 um ", True),
         ("z low", "z lower", True),
-        ("[5, 5]", "[5, 6]", True),
         ("random: 200", "random: 201", True),
     ],
 )
@@ -311,17 +258,6 @@ def test_a_fingerprint_tells_what_matters(
     assert (one != other) == differs
 
 
-def test_axes_of_a_plate_are_told_later(tmp_path: Path) -> None:
-    """Stored cells and the seeds made of their fingerprints stay what they are."""
-    text = Path("designs/hocken_borchardt/angles.yaml").read_text(encoding="utf-8")
-    (tmp_path / "a.yaml").write_text(text, encoding="utf-8")
-    (tmp_path / "b.yaml").write_text(text.replace("x: r1c4", "y: r3c1"), encoding="utf-8")
-    one, other = (
-        [fingerprint(found) for found in load(tmp_path / name)] for name in ("a.yaml", "b.yaml")
-    )
-    assert one == other and len(set(one)) == len(one)
-
-
 def test_dry_run_lists_the_cells(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = small_sweep(tmp_path, 2)
     assert sweep(path, "--dry-run") == 1
@@ -330,14 +266,6 @@ def test_dry_run_lists_the_cells(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert "estimated from 3\ncase 3 fails: " in err
     assert out.splitlines()[1] == "1: size 700 mm, balls 5" and len(out.splitlines()) == 4
     assert err.startswith("4 cases, about ") and not (tmp_path / "small.sqlite").exists()
-
-
-@pytest.mark.parametrize("content", [b"", b"nonsense" * 1000, b"SQLite format 3\0" + b"\0" * 5000])
-def test_no_store(tmp_path: Path, content: bytes, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "x.sqlite").write_bytes(content)
-    assert main(["sweep", "--export", str(tmp_path / "x.sqlite"), "-o", "-"]) == 3
-    out, err = capsys.readouterr()
-    assert out == "" and err.startswith(f"{tmp_path}/x.sqlite: ") and "Traceback" not in err
 
 
 def test_export(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -435,21 +363,14 @@ def test_rows_do_not_depend_on_where_the_command_is_started(tmp_path: Path) -> N
         "base: quickstart.yaml", "base: ../quickstart.yaml"
     )
     (tmp_path / "sweeps" / "s.yaml").write_text(text, encoding="utf-8")
+    here = command("sweep", "s.yaml", "--workers", 2, "--store", tmp_path / "1.sqlite")
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    for workers, name, where in (
-        (1, "s.yaml", tmp_path / "sweeps"),
-        (2, "s.yaml", tmp_path / "sweeps"),
-    ):
-        command_line = [
-            *command("sweep", name, "--workers", workers, "--store", tmp_path / f"{workers}.sqlite")
-        ]
-        subprocess.run(command_line, cwd=where, env=environment, capture_output=True, check=False)
-    elsewhere = ("--store", tmp_path / "3.sqlite", "--workers", 1)
+    subprocess.run(here, cwd=tmp_path / "sweeps", env=environment, capture_output=True, check=False)
+    elsewhere = ("--store", tmp_path / "2.sqlite", "--workers", 1)
     assert run("sweep", tmp_path / "sweeps" / "s.yaml", *elsewhere).returncode == 1
     first = rows(tmp_path / "1.sqlite")
     assert first["reason"][2].startswith("../quickstart.yaml:40:5: positions[0]: ")
-    for k in (2, 3):
-        assert_same(first, rows(tmp_path / f"{k}.sqlite"))
+    assert_same(first, rows(tmp_path / "2.sqlite"))
 
 
 def test_a_store_is_read_where_nothing_can_be_written(
@@ -485,36 +406,16 @@ def test_whole_numbers_are_exported_as_they_are(tmp_path: Path) -> None:
     assert rows(tmp_path / "small.sqlite")["noise"].tolist() == [str(value) for value in values]
 
 
-@pytest.mark.parametrize(
-    ("place", "size", "told"),
-    [
-        (
-            "predict",
-            (1 << 58,),
-            "it needs more memory than is available: there is no room for another 2.00 EiB; ",
-        ),
-        ("experiment_of", (), "it needs more memory than is available; "),
-        (
-            "trials",
-            (1 << 58,),
-            "it needs more memory than is available: there is no room for another 2.00 EiB; ",
-        ),
-    ],
-)
 def test_a_cell_that_finds_no_memory_says_so(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: str, size: tuple[int, ...], told: str
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     loaded = load_sweep(small_sweep(tmp_path, 2, "trials: 10\n"))
-
-    def finds_none(*_: object) -> None:
-        for each in size:
-            np.empty(each)
-        raise MemoryError
-
-    monkeypatch.setattr(f"ballplate.extensions.sweeps.task.{place}", finds_none)
+    monkeypatch.setattr("ballplate.extensions.sweeps.task.predict", lambda *_: np.empty(1 << 58))
     row = compute(loaded, CellTask(0))
-    assert row.status == "failed"
-    assert row.reason == f"{told}use fewer --workers, and --retry-failed to compute it again"
+    assert row.status == "failed" and row.reason == (
+        "it needs more memory than is available: there is no room for another 2.00 EiB; use fewer"
+        " --workers, and --retry-failed to compute it again"
+    )
 
 
 def test_the_errors_of_a_cell_are_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

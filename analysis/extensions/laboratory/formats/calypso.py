@@ -19,10 +19,10 @@ from .report import (
     UNSTATED,
     Feature,
     Format,
+    Located,
     Report,
     ReportProblems,
     System,
-    centre_of,
 )
 from .runs import runs_of
 from .text import Text, read_lines
@@ -137,39 +137,12 @@ def recognises(beginning: str) -> bool:
 
 
 @dataclass
-class _Located:
-    """Co-ordinates of a feature, collected from rows."""
-
-    mark: Mark
-    name: str
-    kind: str = UNSTATED
-    probe: str = ""
-    alignment: str = ""
-    axes: dict[str, float] = field(default_factory=dict)
-    marks: dict[str, str] = field(default_factory=dict)
-
-    def feature(self) -> Feature:
-        """Return the feature, without a centre if an axis is missing."""
-        centre, missing = centre_of(self.axes)
-        lacks = f"no value of {' or '.join(missing)}" if missing else ""
-        system: System = "part" if self.alignment else "unstated"
-        system = "machine" if self.alignment.casefold() in OF_MACHINE else system
-        return Feature(
-            *(self.mark, self.name, self.kind, centre, None, self.probe, system),
-            of=self.alignment,
-            lacks=lacks,
-            marks=self.marks,
-        )
-
-
-@dataclass
 class _Reader:
     table: _Table
     problems: ReportProblems
     unit: Fraction | None
-    rows_taken: list[_Located] = field(default_factory=list)
+    rows_taken: list[Located] = field(default_factory=list)
     others: Counter[str] = field(default_factory=Counter)
-    ends_in_text: bool = False
 
     def rows(self) -> Iterator[tuple[Mark, dict[str, str], dict[str, str]]]:
         """Yield each row by column, and other cells by heading; rows that end before the last
@@ -186,7 +159,6 @@ class _Reader:
                 continue
             if len(cells) == 1 or (not table.is_of_features and not _has_number(cells)):
                 self.others["line (text)"] += 1
-                self.ends_in_text = text.is_cut and number == len(text.lines)
                 continue
             mark = text.mark(number)
             is_cut = text.is_cut and number == len(text.lines)
@@ -219,7 +191,7 @@ class _Reader:
             self.problems.add(mark, problem)
             return
         axes = {axis: self._length(mark, row, row["actual"])}
-        self.rows_taken.append(_Located(mark, name, axes=axes, marks=marks))
+        self.rows_taken.append(Located(Feature(mark, name, UNSTATED, marks=marks), axes))
 
     def _feature(self, mark: Mark, row: dict[str, str], marks: dict[str, str]) -> None:
         words = [row.get("type", ""), row.get("symbol", "")]
@@ -228,10 +200,17 @@ class _Reader:
             for word in (re.sub("[^a-z]", "", w.lower()) for w in words)
             if word in KINDS
         ]
-        kind = kinds[0] if kinds else UNSTATED
-        located = _Located(
-            *(mark, row["id"], kind, row.get("stylus", ""), row.get("alignment", "")), marks=marks
+        kind, alignment = kinds[0] if kinds else UNSTATED, row.get("alignment", "")
+        system: System = "part" if alignment else "unstated"
+        system = "machine" if alignment.casefold() in OF_MACHINE else system
+        feature = Feature(
+            *(mark, row["id"], kind),
+            probe=row.get("stylus", ""),
+            system=system,
+            of=alignment,
+            marks=marks,
         )
+        located = Located(feature)
         for axis in AXES:
             if is_number(row[axis]):
                 located.axes[axis] = self._length(mark, row, row[axis])
@@ -248,20 +227,20 @@ class _Reader:
             return math.nan
         return self.problems.length(with_point(text), unit, mark)
 
-    def complete(self) -> list[_Located]:
+    def complete(self) -> list[Located]:
         """Return features with the co-ordinates of their rows, run by run; a co-ordinate that a
         feature has already begins another reading.
         """
-        keys = [(row.name, *row.axes) for row in self.rows_taken]
-        runs, _ = runs_of(keys, [row.marks for row in self.rows_taken])
-        latest: dict[tuple[str, str], _Located] = {}
+        keys = [(row.feature.name, *row.axes) for row in self.rows_taken]
+        runs, _ = runs_of(keys, [row.feature.marks for row in self.rows_taken])
+        latest: dict[tuple[str, str], Located] = {}
         features = []
         for run, row in zip(runs, self.rows_taken, strict=True):
-            located = latest.get((run, row.name))
+            located = latest.get((run, row.feature.name))
             if located and not (self.table.is_of_features or row.axes.keys() & located.axes.keys()):
                 located.axes.update(row.axes)
                 continue
-            latest[run, row.name] = row
+            latest[run, row.feature.name] = row
             features.append(row)
         return features
 
@@ -313,15 +292,8 @@ def read(content: bytes, file: str, unit: Fraction | None) -> Report:
     for mark, row, marks in reader.rows():
         reader.take(mark, row, marks)
     problems.finish()
-    features = tuple(located.feature() for located in reader.complete())
-    remarks = text.remarks
-    if reader.ends_in_text:
-        last = shorten(text.lines[-1].strip(), 30)
-        remarks += (
-            f'{file}: the last line, "{last}", is no row, and has no end; the file may have been'
-            " cut off",
-        )
-    return Report(file, CALYPSO.title, features, reader.others, remarks)
+    features = tuple(located.complete() for located in reader.complete())
+    return Report(file, CALYPSO.title, features, reader.others, text.remarks)
 
 
 CALYPSO = Format("calypso", "Calypso table", recognises, read)

@@ -125,8 +125,6 @@ class _Reader:
     nominal: dict[str, Feature] = field(default_factory=dict)
     marks: dict[str, str] = field(default_factory=dict)
     files: int = 0
-    # Names of files without their number, by the name with it.
-    names: dict[str, str] = field(default_factory=dict)
     # Points by the sphere that they are on, as probed in each measurement of it and as features
     # that it is made of.
     probed: dict[str, list[tuple[dict[str, str], list[Place]]]] = field(default_factory=dict)
@@ -169,11 +167,8 @@ class _Reader:
             self.files += statement.word == "FILNAM"
             quoted = QUOTED.match(statement.rest)
             text = quoted[2].strip() if quoted else statement.rest.strip("'\" ")
-            if statement.word == "FILNAM":
-                self.marks = self.marks | {statement.word: f"{text} {self.files}"}
-                self.names[f"{text} {self.files}"] = text
-            else:
-                self.marks = self.marks | {statement.word: text}
+            text += f" {self.files}" if statement.word == "FILNAM" else ""
+            self.marks = self.marks | {statement.word: text}
         self.is_program |= statement.word in OF_PROGRAMS
         self.is_ended |= statement.word == "ENDFIL"
 
@@ -313,22 +308,6 @@ def _of_points(reader: _Reader) -> Iterator[Feature]:
             yield replace(nominal, centre=None, points=array, lacks=lack, marks=marks)
 
 
-def _named_by_parts(features: list[Feature], names: dict[str, str]) -> list[Feature]:
-    """Features whose files have their part in place of a number, where each has another one."""
-    for word in ("PARTSN", "PARTID"):
-        pairs = {(f.marks.get("FILNAM", ""), f.marks.get(word, "")) for f in features}
-        if not all(file and text for file, text in pairs):
-            continue
-        by_file = {file: f"{names[file]} {text}" for file, text in pairs}
-        # One part in each file, and none in two.
-        if len(pairs) > 1 and len(by_file) == len(set(by_file.values())) == len(pairs):
-            return [
-                replace(f, marks={**f.marks, "FILNAM": by_file[f.marks["FILNAM"]]})
-                for f in features
-            ]
-    return features
-
-
 def read(content: bytes, file: str, unit: Fraction | None) -> Report:
     """Return features of DMIS output; see `Format`.
 
@@ -341,7 +320,6 @@ def read(content: bytes, file: str, unit: Fraction | None) -> Report:
     reader.problems.finish()
     features = [statement for several in reader.actual.values() for statement in several]
     features += _of_points(reader)
-    features = _named_by_parts(features, reader.names)
     features.sort(key=lambda statement: statement.mark.line)
     remarks = text.remarks
     if not reader.is_ended:

@@ -22,9 +22,9 @@ from .report import (
     UNSTATED,
     Feature,
     Format,
+    Located,
     Report,
     ReportProblems,
-    centre_of,
 )
 from .runs import OF_RUNS
 from .text import Text, read_lines
@@ -65,31 +65,6 @@ class _Dimension:
 
 
 @dataclass
-class _Located:
-    """Co-ordinates of a feature, collected from dimensions."""
-
-    mark: Mark
-    name: str
-    title: str
-    kind: str
-    probe: str
-    marks: dict[str, str]
-    axes: dict[str, float] = field(default_factory=dict)
-
-    def feature(self) -> Feature:
-        """Return the feature, without a centre if an axis is missing."""
-        centre, missing = centre_of(self.axes)
-        lacks = f"no row {' or '.join(missing)}" if missing else ""
-        return Feature(
-            *(self.mark, self.name, self.kind, centre),
-            probe=self.probe,
-            lacks=lacks,
-            dimension=self.title,
-            marks=self.marks,
-        )
-
-
-@dataclass
 class _Reader:
     text: Text
     problems: ReportProblems
@@ -97,8 +72,8 @@ class _Reader:
     probe: str = ""
     marks: dict[str, str] = field(default_factory=dict)
     dimension: _Dimension | None = None
-    located: dict[str, _Located] = field(default_factory=dict)
-    complete: list[_Located] = field(default_factory=list)
+    located: dict[str, Located] = field(default_factory=dict)
+    complete: list[Located] = field(default_factory=list)
     others: Counter[str] = field(default_factory=Counter)
 
     def take(self, number: int, line: str) -> None:
@@ -155,15 +130,12 @@ class _Reader:
         if ended is None or ended.has_row:
             return
         if ended.kind != UNSTATED:
-            located = _Located(
-                *(ended.mark, ended.name, ended.title, ended.kind), self.probe, self.marks
-            )
-            self.complete.append(located)
+            self.complete.append(self._located(ended, ended.mark))
         elif ended.columns:
             self.others[f"dimension (no row {' or '.join(AXES)})"] += 1
 
-    def finish(self) -> tuple[str, ...]:
-        """End the file; add a note if its last line is incomplete and of unknown form.
+    def finish(self) -> None:
+        """End the file.
 
         :raises ExperimentError: earlier faults, or the file ends before the first row of a
             dimension or within its name.
@@ -179,17 +151,6 @@ class _Reader:
             problem = "the file ends within this line; it was cut off, take a whole copy"
             self.problems.add(self.text.mark(len(self.text.lines)), problem)
         self.problems.finish()
-        return self.text.remarks + self._about_the_end(last)
-
-    def _about_the_end(self, last: str) -> tuple[str, ...]:
-        words = last.split()
-        is_row = self.dimension is not None and words[:1] and words[0].upper() in tuple(AXES)
-        if not self.text.is_cut or is_row or ENDING.fullmatch(last) or PROBE.fullmatch(last):
-            return ()
-        return (
-            f'{self.text.file}: the last line, "{shorten(last.strip(), 30)}", has no end; the file'
-            " may have been cut off",
-        )
 
     def _start(self, title: str, words: str, unit: str | None, mark: Mark) -> None:
         located = LOCATION.match(words)
@@ -235,15 +196,23 @@ class _Reader:
         value = self.problems.length(with_point(row[measured]), self.dimension.unit, mark)
         self._locate(axis, value, mark)
 
+    def _located(self, found: _Dimension, mark: Mark) -> Located:
+        return Located(
+            Feature(
+                *(mark, found.name, found.kind),
+                probe=self.probe,
+                dimension=found.title,
+                marks=self.marks,
+            )
+        )
+
     def _locate(self, axis: str, value: float, mark: Mark) -> None:
         """Add a co-ordinate to its feature; one that it has already begins another reading."""
         assert self.dimension is not None
-        name, title = self.dimension.name, self.dimension.title
+        name = self.dimension.name
         located = self.located.get(name)
         if located is None or axis in located.axes:
-            kind = self.dimension.kind
-            located = _Located(mark, name, title, kind, self.probe, self.marks)
-            self.located[name] = located
+            self.located[name] = located = self._located(self.dimension, mark)
             self.complete.append(located)
         located.axes[axis] = value
 
@@ -289,9 +258,9 @@ def read(content: bytes, file: str, unit: Fraction | None) -> Report:
     reader = _Reader(text, ReportProblems(file), unit)
     for number, line in enumerate(text.lines, start=1):
         reader.take(number, line)
-    remarks = reader.finish()
-    features = tuple(located.feature() for located in reader.complete)
-    return Report(file, PCDMIS.title, features, reader.others, remarks)
+    reader.finish()
+    features = tuple(located.complete() for located in reader.complete)
+    return Report(file, PCDMIS.title, features, reader.others, text.remarks)
 
 
 PCDMIS = Format("pcdmis", "PC-DMIS report", lambda text: BEGINNING.search(text) is not None, read)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import re
 from fractions import Fraction
-from itertools import pairwise
 from pathlib import Path
 
 from ballplate.simulator.inputs import (
@@ -24,8 +22,6 @@ from .report import Format, Report
 # Asked in this order: the first that recognises a file reads it.
 FORMATS: tuple[Format, ...] = (QIF, DMIS, PCDMIS, CALYPSO)
 
-NUMBER = re.compile("[+-]?[0-9]+(?:[.,][0-9]*)?(?:[eE][+-]?[0-9]+)?")
-
 # Characters at the beginning of a file by which it is recognised.
 BEGINNING = 100_000
 
@@ -36,22 +32,6 @@ def recognised(text: str) -> Format | None:
     return next(
         (report_format for report_format in FORMATS if report_format.recognises(beginning)), None
     )
-
-
-def is_table(text: str) -> bool:
-    r"""True if lines of a text are rows of the same columns, of a name at least and three numbers.
-
-    >>> is_table("p;b;x;y;z\nlow;1;0,1;2,5;3"), is_table("one, two, three, four\nfive")
-    (True, False)
-    """
-    lines = [line for line in text[:BEGINNING].splitlines() if line.strip()]
-    for separator in ("\t", ";", ","):
-        for before, row in pairwise(lines[:50]):
-            cells = row.split(separator)
-            numbers = sum(NUMBER.fullmatch(cell.strip(' "')) is not None for cell in cells)
-            if numbers >= 3 and 4 <= len(cells) == len(before.split(separator)):
-                return True
-    return False
 
 
 def read_report(
@@ -76,9 +56,7 @@ def read_report(
         if encoding is not None and report_format is not QIF:
             content = text.encode("utf-8", "surrogatepass")
         return report_format.read(content, file, unit)
-    if is_table(text):
-        raise refused(file, "this is a table, which needs no import; ballplate fit reads it")
     titles = listing(known_format.title for known_format in FORMATS)
     names = ", ".join(known_format.name for known_format in FORMATS)
-    text = f"not recognised as {titles}; state its format with --from ({names})"
-    raise refused(file, text)
+    text = f"not recognised as {titles}; state its format with --from ({names}); a table needs no"
+    raise refused(file, f"{text} import: ballplate fit reads it")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Literal
 
@@ -83,10 +83,19 @@ class Format:
     read: Callable[[bytes, str, Fraction | None], Report]
 
 
-def centre_of(axes: Mapping[str, float]) -> tuple[Place | None, list[str]]:
-    """Return the centre from co-ordinates by axis, if complete; and the missing axes."""
-    missing = [axis for axis in AXES if axis not in axes]
-    return (None if missing else (axes["X"], axes["Y"], axes["Z"])), missing
+@dataclass
+class Located:
+    """A feature whose co-ordinates by axis are collected from rows of a table."""
+
+    feature: Feature
+    axes: dict[str, float] = field(default_factory=dict)
+
+    def complete(self) -> Feature:
+        """Return the feature, without a centre if an axis is missing."""
+        missing = [axis for axis in AXES if axis not in self.axes]
+        if missing:
+            return replace(self.feature, lacks=f"no row {' or '.join(missing)}")
+        return replace(self.feature, centre=(self.axes["X"], self.axes["Y"], self.axes["Z"]))
 
 
 @dataclass

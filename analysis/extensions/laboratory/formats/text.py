@@ -36,6 +36,9 @@ def read_lines(content: bytes, file: str) -> Text:
     text, encoding = decoded(content, file)
     refuse_controls(text, file)
     lines = LINE_END.split(text)
-    is_guess = not encoding.startswith("UTF")
-    remarks = (f"{file}: not UTF-8; read as {encoding}",) if is_guess else ()
-    return Text(file, tuple(lines), remarks, is_cut=bool(lines[-1].strip()))
+    is_cut, remarks = bool(lines[-1].strip()), []
+    if not encoding.startswith("UTF"):
+        remarks.append(f"{file}: not UTF-8; read as {encoding}")
+    if is_cut:
+        remarks.append(f"{file}: the last line has no end; the file may have been cut off")
+    return Text(file, tuple(lines), tuple(remarks), is_cut)

@@ -90,7 +90,7 @@ export function figures() {
   const said = [is_old ? "" : $("figures").innerText, ...notes].join("; ");
   if (!state.pending && $("said").textContent !== said) $("said").textContent = said;
   fill($("counts"), lines(rank
-    ? [`${rank.parameters} parameters from ${rank.observations} observations`, ...rank.reasons]
+    ? [`${rank.parameters} parameters from ${rank.observations} observations`]
     : []));
   directions(rank?.directions ?? []);
 }

@@ -41,13 +41,12 @@ function magnified({ result }) {
 export const candidate = () => current().find((one) => one.settings)?.settings;
 
 function suggestion(one) {
-  const { average, maximum, deficiency, weak, faint } = one;
+  const { average, maximum, deficiency, weak } = one;
   const figure = Number.isFinite(average)
     ? `U6 ${micro(average)} µm on average, ${micro(maximum)} µm at most`
     : deficiency ? `rank deficiency ${deficiency} left` : "";
   return make("li", {}, make("div", {}, one.words), make("div", {}, figure,
-    weak ? `; ${weak} ${weak > 1 ? "directions stay" : "direction stays"} weak` : "",
-    faint ? "; barely determined" : ""),
+    weak ? `; ${weak} ${weak > 1 ? "directions stay" : "direction stays"} weak` : ""),
   make("div", { class: "bar" }, buttons(one)));
 }
 

@@ -1,0 +1,233 @@
+"""Each option of each command does what it promises: with it, the outcome of a small command has
+something that it has not without it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import shlex
+import shutil
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import openpyxl
+import pytest
+from ballplate.cli import parser
+
+from tests.cli.option_table import READING, TABLE, TABLES
+from tests.robustness.kit import POOL, make_kit
+from tests.robustness.worker import outcome
+
+PLATE = """\
+title: a plate
+machine: {volume: [600 mm, 500 mm, 400 mm], repeatability: 0.5 um}
+error_model: {kind: metric}
+probes: {down: [0 mm, 0 mm, -50 mm], right: [60 mm, 0 mm, 0 mm]}
+artefacts: {plate: {kind: grid, balls: [3, 3], size: [300 mm, 300 mm]}}
+positions:
+  - {name: low, plane: z, level: 100 mm, corner: {x: 50 mm, y: 50 mm}, probes: [down]}
+  - {name: wall, plane: x, level: 200 mm, corner: {y: 50 mm, z: 45 mm}, probes: [right, down]}
+  - {name: side, plane: y, level: 200 mm, corner: {z: 45 mm, x: 50 mm}, probes: [down]}
+calibration: [{kind: distances, pairs: all, standard_uncertainty: 0.5 um}]
+target_uncertainty: 2 um + L/300000
+evaluation:
+  points: {random: 8, seed: 1}
+  probe: down
+  tasks: [{name: along x, from: [50 mm, 200 mm, 100 mm], to: [550 mm, 200 mm, 100 mm]}]
+"""
+VARIANTS = "variants: {plain: {}, coarse: {machine.repeatability: 1 um}}\n"
+SECOND = (
+    PLATE.replace(
+        "300 mm]}}", "300 mm]}, second: {kind: grid, balls: [2, 2], size: [300 mm, 300 mm]}}"
+    )
+    .replace("{name: side,", "{name: side, artefact: second,")
+    .replace("plane: z", "plane: z, artefact: plate")
+    .replace("plane: x", "plane: x, artefact: plate")
+    .replace("[{kind: dist", "[{artefact: plate, kind: dist")
+)
+OUTER = PLATE.replace(
+    "{kind: grid, balls: [3, 3], size: [300 mm, 300 mm]}", "{kind: balls, file: ../outside.csv}"
+)
+INNER = """\
+title: files of the folder above
+base: outer.yaml
+axes: {repeatability: {path: machine.repeatability, values: [1 um, 2 um]}}
+record: [U6]
+"""
+OFFSETS = {"down": (0.0, 0.0, -50.0), "right": (60.0, 0.0, 0.0)}
+REPORT = """\
+FILNAM/'WITHOUT A UNIT'
+F(ZLOW_R1C1)=FEAT/SPHERE,OUTER,CART,1,2,3,22
+FA(ZLOW_R1C1)=FEAT/SPHERE,OUTER,CART,1.0,2.0,3.0,22.0
+FA(ZLOW_R1C5)=FEAT/CIRCLE,INNER,CART,4.0,2.0,3.0,0,0,1,20.0
+ENDFIL
+"""
+
+SURFACE = "FILNAM/'POINTS'\nUNITS/MM,ANGDEC\nF(ZLOW_R1C1)=FEAT/SPHERE,OUTER,CART,0,0,0,20\nMEAS/SPHERE,F(ZLOW_R1C1),6\n"
+SURFACE += (
+    "".join(
+        f"PTMEAS/CART,{10.001 * x},{9.998 * y},{10 * z},{x},{y},{z}\n"
+        for x, y, z in ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0.6, 0.8, 0))
+    )
+    + "ENDMES\nENDFIL\n"
+)
+BALLS = "ball,x_mm,y_mm,z_mm\na,0,0,0\nb,300,0,0\nc,0,300,0\nd,300,300,0\n"
+TURN = "angle_deg,error_um\n" + "".join(f"{10 * k},{(k % 18) ** 2 / 100}\n" for k in range(36))
+
+# Progress bars are all that they print beside their results, and only on a terminal.
+SILENT = (
+    *("check", "compare", "correct", "diff", "map", "map --curves", "reach", "reproduce", "run"),
+    *("run --errors", "run --reliability", "schema", "spline", "studio"),
+    *("sweep", "sweep --export", "sweep --report"),
+)
+# Shown by other tests, as the page; or what no small command shows: a search ends alike from any seed.
+ELSEWHERE = {
+    "studio --variant",
+    "studio --port",
+    "studio --no-browser",
+    "studio --verbose",
+    "sweep --scheduler",
+    "plan --seed",
+    *(f"{name} --workers" for name in ("run", "plan", "sweep")),
+}
+
+
+@pytest.fixture(scope="module")
+def kit(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with all files that the lines name."""
+    folder = tmp_path_factory.mktemp("options") / "kit"
+    folder.mkdir()
+    make_kit(folder)
+    (folder / "pipe.csv").unlink()
+    (folder / "loop.csv").unlink()
+    (folder / "inner").mkdir()
+    texts = {
+        "plate.yaml": PLATE,
+        "pair.yaml": PLATE + VARIANTS,
+        "twice.yaml": POOL + VARIANTS,
+        "plates.yaml": SECOND,
+        "no-unit.dmo": REPORT,
+        "outside.csv": BALLS,
+        "inner/outer.yaml": OUTER,
+        "inner/sweep.yaml": INNER,
+        "surface.dmo": SURFACE,
+        "own.yaml": PLATE.replace("{kind: metric}", "{kind: python, object: own:build}"),
+        "anonymous.csv": "name,x_mm,y_mm,z_mm\nA,50,200,100\n",
+    }
+    for name, text in texts.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    simulate = ["simulate", "plate.yaml", "-o"]
+    certificate = ["--certificate", "plate-certificate.csv"]
+    outcome([*simulate, "plate.csv", "--seed", "5", *certificate], folder)
+    outcome([*simulate, "plate-again.csv", "--seed", "6"], folder)
+    outcome(["simulate", "plates.yaml", "-o", "plates.csv"], folder)
+    begun = (folder / "planned-readings.csv").read_text(encoding="utf-8").splitlines(True)[:7]
+    (folder / "begun.csv").write_text("".join(begun), encoding="utf-8")
+    _write_tables(folder)
+    return folder
+
+
+def _write_tables(folder: Path) -> None:
+    """The same readings in other forms."""
+    head, *rows = csv.reader((folder / "plate.csv").read_text(encoding="utf-8").splitlines())
+    names = [row[:3] for row in rows]
+    places = [[float(cell) for cell in row[3:]] for row in rows]
+
+    def write(name: str, head: list[str], columns: list[Any], separator: str = ",") -> None:
+        taken = [[*a, *b] for a, b in zip(*columns, strict=True)]
+        lines = [separator.join(map(str, row)) for row in (head, *taken)]
+        (folder / name).write_text("\n".join([*lines, ""]), encoding="utf-8")
+
+    write("renamed.csv", ["wo", "was", *head[2:]], [names, places])
+    write("unitless.csv", [*head[:3], "x", "y", "z"], [names, places])
+    grouped = [[f"{1e3 * x:,.0f}" for x in row] for row in places]
+    micrometres = [name.replace("_mm", "_um") for name in head]
+    write("thousands.csv", micrometres, [names, grouped], ";")
+    centres = [
+        [x + y for x, y in zip(row, OFFSETS[name[2]], strict=True)]
+        for name, row in zip(names, places, strict=True)
+    ]
+    write("centres.csv", head, [names, centres])
+    write("features.csv", ["feature", *head[3:]], [[["/".join(name)] for name in names], places])
+    before = ["", *(position for position, *_ in names[:-1])]
+    blank = [[a * (a != b), *c] for (a, *c), b in zip(names, before, strict=True)]
+    write("blank.csv", head, [blank, places])
+    write("swapped.csv", head, [[names[1], names[0], *names[2:]], places])
+    workbook = openpyxl.Workbook()
+    workbook.active.title = "taken"
+    for sheet in (workbook.active, workbook.create_sheet("again")):
+        for row in (head, *([*a, *b] for a, b in zip(names, places, strict=True))):
+            sheet.append(row)
+    workbook.save(folder / "two.xlsx")
+
+
+@cache
+def written(line: str, kit: Path) -> str:
+    """Status, outputs and files of a command in a copy of the kit."""
+    folder = kit.with_name("copy")
+    shutil.copytree(kit, folder)
+    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    status, out, err = outcome(shlex.split(line), folder)
+    parts = [f"status {status}", out, err]
+    for path in sorted(folder.rglob("*")):
+        if path.is_file() and path.read_bytes() != before.get(path):
+            parts += [f"--file {path.name}", path.read_bytes().decode("utf-8", "replace")]
+    shutil.rmtree(folder)
+    return "\n".join(parts)
+
+
+def first_lines() -> dict[str, str]:
+    """A line of each command in the table."""
+    return {shlex.split(line)[0]: line for line, *_ in reversed(TABLE)}
+
+
+ALL = (
+    *TABLE,
+    *(
+        (f"{name} plate.yaml {file}", option, text)
+        for name, text in READING.items()
+        for file, option in TABLES
+    ),
+    *(
+        (f"{name} plate.yaml unitless.csv --unit mm", "--quiet", "without: unitless.csv: read as")
+        for name in READING
+    ),
+    *((f"{name} pair.yaml plate.csv", "--variant coarse", text) for name, text in READING.items()),
+    *((line, "--verbose", "\nnumpy ") for line in first_lines().values() if line != "schema"),
+)
+
+
+@pytest.mark.parametrize(("line", "option", "text"), ALL)
+def test_option(line: str, option: str, text: str, kit: Path) -> None:
+    without, with_it = written(line, kit), written(f"{line} {option}", kit)
+    if text.startswith("without: "):
+        with_it, without = without, with_it
+        text = text.removeprefix("without: ")
+    assert text in with_it and text not in without
+
+
+def options() -> Iterator[tuple[str, argparse.Action]]:
+    """Each option of each command, other than help."""
+    (commands,) = (
+        action.choices
+        for action in parser()._actions
+        if isinstance(action, argparse._SubParsersAction)
+    )
+    for name, command in commands.items():
+        for action in command._actions:
+            if action.option_strings and action.dest != "help":
+                yield name, action
+
+
+def test_every_option_is_in_the_table() -> None:
+    stated = {(shlex.split(line)[0], shlex.split(option)[0]) for line, option, _ in ALL}
+    missing = [
+        f"{name} {action.option_strings[-1]}"
+        for name, action in options()
+        if not any((name, form) in stated for form in action.option_strings)
+    ]
+    silent = {f"{name} --quiet" for name in SILENT}
+    assert sorted(missing) == sorted(silent | ELSEWHERE)
