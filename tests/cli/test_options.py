@@ -114,8 +114,6 @@ def kit(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "inner/outer.yaml": OUTER,
         "inner/sweep.yaml": INNER,
         "surface.dmo": SURFACE,
-        "turn.csv": TURN,
-        "nominal.csv": "nominal_x_mm,nominal_z_mm\n60.46455,-143.0105\n",
         "own.yaml": PLATE.replace("{kind: metric}", "{kind: python, object: own:build}"),
         "anonymous.csv": "name,x_mm,y_mm,z_mm\nA,50,200,100\n",
     }

@@ -93,8 +93,8 @@ errors:
 squareness: {EC0Y: 21 urad}
 """
 
-CURVE = "position_mm,error_um,u_um\n" + "".join(
-    f"{20 * k},{error},0.2\n"
+CURVE = "position_mm,error_um\n" + "".join(
+    f"{20 * k},{error}\n"
     for k, error in enumerate((0, 0.5, 0.8, 0.4, -0.1, -0.3, 0.2, 0.9, 1.4, 1.1, 0.6, 0.1))
 )
 
