@@ -91,8 +91,8 @@ OTHERS = {
         "1000,-1.5,1500.5\n"
     ),
     "spline.csv": (
-        "point,feature,nominal_x_mm,nominal_z_mm,normal_x,normal_z,error_um\n"
-        "1,face,10.5,0,0.6,0.8,1.5\n2,face,20.5,0,0.6,0.8,2.5\n"
+        "point,feature,nominal_x_mm,nominal_z_mm,error_um\n"
+        "1,face,10.5,0,1.5\n2,face,20.5,0,2.5\n"
     ),
     "correct.csv": "probe,ball,x_mm,y_mm,z_mm\ndown,a,100.5,200,300\nlong,b,500,500,500.25\n",
 }
