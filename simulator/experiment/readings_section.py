@@ -14,7 +14,6 @@ from ..machines.described import OfMachineFile
 from ..machines.protocol import TrueMachine
 
 Coordinate = Literal["scale readings", "ball centres", "part"]
-COORDINATES: tuple[Coordinate, ...] = ("scale readings", "ball centres", "part")
 
 Columns = Forms[Name, Name, Annotated[dict[Name, Name], Field(min_length=1)]]
 _COORDINATE = "its name or number, or {probe: column, …} if each probe has a column"

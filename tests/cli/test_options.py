@@ -75,7 +75,6 @@ SURFACE += (
     + "ENDMES\nENDFIL\n"
 )
 BALLS = "ball,x_mm,y_mm,z_mm\na,0,0,0\nb,300,0,0\nc,0,300,0\nd,300,300,0\n"
-TURN = "angle_deg,error_um\n" + "".join(f"{10 * k},{(k % 18) ** 2 / 100}\n" for k in range(36))
 
 # Progress bars are all that they print beside their results, and only on a terminal.
 SILENT = (
