@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from ballplate.extensions.assumptions.interface import assumptions
     from ballplate.extensions.campaign.interface import sheet
     from ballplate.extensions.certificates.interface import certificate
+    from ballplate.extensions.diagnosis.interface import reliability
     from ballplate.extensions.drafting.interface import design
     from ballplate.extensions.information.interface import information
     from ballplate.extensions.judgement.interface import budget, compare_models, validate
@@ -48,7 +49,6 @@ if TYPE_CHECKING:
         map,
     )
     from ballplate.extensions.pages.interface import page
-    from ballplate.extensions.reliability.interface import reliability
     from ballplate.extensions.repair.interface import repair
     from ballplate.extensions.reproduction.interface import reproduce
     from ballplate.extensions.requirements.interface import reach

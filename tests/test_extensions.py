@@ -28,15 +28,13 @@ NAMES = tuple(extension.name for extension in SHIPPED)
 # What an extension takes from another one, and why that is no part of the kernel.
 BUILDS_ON = {
     ("campaign", "requirements"): "the next position is chosen for the goals of `reach`",
-    ("judgement", "reliability"): "the residuals of each model are searched as those of a fit",
-    ("judgement", "questions"): "an assumption that fails is no reason for a larger model",
-    ("questions", "reliability"): "causes are told from gross errors by the same search",
+    ("judgement", "diagnosis"): "the residuals of each model are searched as those of a fit",
     ("certificates", "laboratory"): "both read XML",
-    ("maps", "reliability"): "certificates in common act on fits as gross errors do",
+    ("maps", "diagnosis"): "certificates in common act on fits as gross errors do",
     ("pages", "campaign"): "the page of a design has its run sheet",
     ("pages", "maps"): "the page of a design has its map of lengths",
-    ("pages", "reliability"): "pages show how gross errors would act",
-    ("reliability", "laboratory"): "offsets that are stated wrong are searched as in readings",
+    ("pages", "diagnosis"): "pages show how gross errors would act",
+    ("diagnosis", "laboratory"): "offsets that are stated wrong are searched as in readings",
     ("studio", "maps"): "the studio shows the map of lengths in the volume",
     ("studio", "pages"): "the studio moves designs as pages do",
     ("sweeps", "pages"): "the page of a sweep is a page",
@@ -152,7 +150,7 @@ def test_no_name_is_provided_twice() -> None:
 
 
 # What others build on.
-SOME = ("campaign", "laboratory", "maps", "reliability", "requirements")
+SOME = ("campaign", "laboratory", "maps", "diagnosis", "requirements")
 
 WITHOUT = """
 import sys
@@ -185,9 +183,9 @@ from ballplate.extensions import SHIPPED
 
 fit = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart()))
 unsearched = [text for text in fit.warnings if "not looked for" in text]
-hidden = {"laboratory", "reliability"} & {*sys.argv[3:]}
+hidden = {"laboratory", "diagnosis"} & {*sys.argv[3:]}
 assert len(unsearched) == ("laboratory" in hidden) + bool(hidden), fit.warnings
-assert all("extension laboratory" in text or "extension reliability" in text for text in unsearched)
+assert all("extension laboratory" in text or "extension diagnosis" in text for text in unsearched)
 assert fit.converged and "<table" in fit._repr_html_() and "<table" in bp.check(quickstart)._repr_html_()
 with contextlib.suppress(SystemExit):
     main(["--help"])

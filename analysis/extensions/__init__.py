@@ -120,7 +120,7 @@ SHIPPED = (
         functions=_from("interface", "budget", "compare_models", "validate"),
     ),
     _here(
-        "reliability",
+        "diagnosis",
         commands={
             "run --reliability": Command(
                 "reliability_command",
@@ -130,7 +130,6 @@ SHIPPED = (
         functions=_from("interface", "reliability"),
         services=_from("searched_fit", "diagnosed"),
     ),
-    _here("questions", services=_from("asking", "assumptions_asked")),
     _here(
         "certificates",
         commands={

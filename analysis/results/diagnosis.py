@@ -14,39 +14,53 @@ from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.maps.fit_verdict import LackOfFit
 
 
-class Suspicion(Protocol):
-    """Observations flagged as gross errors; false if there are none.
+class NamedCause(Protocol):
+    """A cause: one of an observation if it `is_gross`, in `words`."""
 
-    It `names_causes` unless it states only that no gross error explains the residuals. `marks` are
-    the locations of readings.
+    @property
+    def is_gross(self) -> bool: ...
+
+    @property
+    def words(self) -> str: ...
+
+
+class Suspicion(Protocol):
+    """Causes that residuals show; false if there are none.
+
+    It `names_causes` unless it states only that no cause explains the residuals; `gross_errors` is
+    the number of those among observations.
     """
 
     @property
-    def suspects(self) -> Sequence[object]: ...
+    def findings(self) -> Sequence[NamedCause]: ...
+
+    @property
+    def gross_errors(self) -> int: ...
 
     @property
     def names_causes(self) -> bool: ...
 
+    @property
+    def verdict(self) -> tuple[str, ...]: ...
+
     def __bool__(self) -> bool: ...
 
-    def words(self, marks: Sequence[Mark] = ()) -> list[str]: ...
+    def lines(self) -> list[str]: ...
 
-    def lines(self, marks: Sequence[Mark] = ()) -> list[str]: ...
-
-    def data(self, marks: Sequence[Mark] = ()) -> list[Data]: ...
+    def to_dict(self) -> Data: ...
 
 
 def diagnosed(
-    at: Linearisation, x: Array, freedom: int, sigma_is_estimated: bool
+    at: Linearisation, x: Array, sigma_is_estimated: bool, marks: Sequence[Mark]
 ) -> tuple[Suspicion | None, str]:
-    """Return flagged observations, None without the extension, and the reason why there was no
-    search, or an empty text.
+    """Return what the residuals show, None without the extension, and the reason why there was no
+    search, or an empty text; `marks` are the locations of readings.
     """
     try:
         search = service("diagnosed")
     except MissingExtensionError as error:
         return None, f"gross errors were not looked for ({error})"
-    diagnosis: tuple[Suspicion, str] = search(at, x, freedom, sigma_is_estimated)
+    diagnosis: tuple[Suspicion, str] = search(at, x, sigma_is_estimated, marks)
     return diagnosis
 
 
@@ -54,8 +68,14 @@ def lack_of_fit(
     squares: float, freedom: int, diagnosis: Suspicion | None, untested: str
 ) -> LackOfFit:
     """Return the lack of fit of a sum of squares; `untested` residuals may have a pattern."""
-    count = len(diagnosis.suspects) if diagnosis else 0
-    return LackOfFit(squares, freedom, count, bool(diagnosis or untested))
+    if not diagnosis:
+        return LackOfFit(squares, freedom, 0, bool(untested))
+    contradicted = tuple(
+        verdict
+        for finding, verdict in zip(diagnosis.findings, diagnosis.verdict, strict=True)
+        if not finding.is_gross
+    )
+    return LackOfFit(squares, freedom, diagnosis.gross_errors, True, contradicted)
 
 
 def has_exact_values(design: Design) -> bool:

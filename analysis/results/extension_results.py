@@ -30,18 +30,6 @@ class PredictedAssumptions(AskedResult, Protocol):
     def summary(self) -> list[str]: ...
 
 
-class AskedAssumptions(AskedResult, Protocol):
-    """Answers of readings to assumptions; `verdict` has the causes that contradict them, of which
-    one `explains` the residuals if none may be further terms of the error model.
-    """
-
-    @property
-    def verdict(self) -> tuple[str, ...]: ...
-
-    @property
-    def explains(self) -> bool: ...
-
-
 class IssuedCertificate(AskedResult, Protocol):
     """A plate's co-ordinates in its own axes, by their `datum`; `texts` are files by name."""
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,7 +27,6 @@ from ballplate.results.estimates import (
     labels,
 )
 from ballplate.results.extension_results import (
-    AskedAssumptions,
     IssuedCertificate,
 )
 from ballplate.results.map_of_fit import counted_twice, map_of
@@ -53,7 +51,7 @@ from ballplate.results.text_blocks import (
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.gauss_newton import Solution
 from ballplate.simulator.inputs.arguments import ensure_positive, ensure_type
-from ballplate.simulator.inputs.extensions import function, optional_service, service
+from ballplate.simulator.inputs.extensions import function, service
 from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.maps.fit_verdict import LackOfFit
@@ -85,9 +83,9 @@ class Fit(FitResult):
 
     `observed` has the design and its readings. `sigma` multiplies all stated uncertainties: the
     root of S^2 over the degrees of freedom, or 1 if the file takes uncertainties as given.
-    `adjustments` are those of a three-dimensional metric. `diagnosis` flags gross errors, which
-    stay in the fit, or `untested` states why there is none. `estimated` has all estimates as
-    functions of the parameters, without `sigma`. `experiment` was fitted.
+    `adjustments` are those of a three-dimensional metric. `diagnosis` has the causes that
+    the readings show, which stay in the fit, or `untested` states why there is none. `estimated`
+    has all estimates as functions of the parameters, without `sigma`. `experiment` was fitted.
     `campaigns` are the sigmas of prior maps; if these are separate, `degrees_of_freedom` are the
     fewest of them.
     """
@@ -154,10 +152,8 @@ class Fit(FitResult):
         if not self.converged:
             return lines
         lines += ["", *self._residual_table()]
-        if self._suspicion:
-            lines += self._suspicion.lines(self.observed.marks)
-        if self.assumptions is not None:
-            lines += ["", *self.assumptions.lines()]
+        if self.diagnosis is not None:
+            lines += ["", *self.diagnosis.lines()]
         lines += ["", *uncertainty_table(self.quantities, self.lack_of_fit.caveat), ""]
         lines += [*task_table(self.tasks, self.lack_of_fit.caveat), ""] if self.tasks else []
         printed = [
@@ -206,8 +202,7 @@ class Fit(FitResult):
             **given(
                 error_functions=[curve.to_dict() for curve in curves],
                 residuals=self._residual_groups(),
-                suspected=self._suspicion and self._suspicion.data(self.observed.marks),
-                assumptions=self.assumptions and self.assumptions.to_dict(),
+                diagnosis=None if self.diagnosis is None else self.diagnosis.to_dict(),
             ),
             "estimates": {
                 name: picked(item, "value", "standard_uncertainty", "unit")
@@ -284,8 +279,8 @@ class Fit(FitResult):
         write_file(path, self.page().encode("utf-8", "replace"))
 
     def page(self) -> str:
-        """The page of the fit as text: verdict, curves, residuals, reliability, plate,
-        assumptions.
+        """The page of the fit as text: verdict, curves, residuals, diagnosis, reliability,
+        plate.
 
         :raises ValueError: the fit has no experiment.
         """
@@ -437,21 +432,19 @@ class Fit(FitResult):
             )
         if self.too_large:
             advice = (
-                "no single gross error and no assumption that was asked explains that: try a larger"
-                " error model or larger uncertainties"
+                "no single cause that was tested explains that: try a larger error model or larger"
+                " uncertainties"
             )
             if has_exact_values(self.design):
                 advice += "; several values stated as exact may be in error, too"
             if self.diagnosis and self.diagnosis.names_causes:
-                advice = "see what is suspected"
-            elif self.assumptions is not None and self.assumptions.verdict:
                 advice = "see what the readings contradict"
             times = self.lack_of_fit.times
             warnings.append(
                 f"S^2 is {times:.3g} times what the stated uncertainties explain; {advice}"
             )
-        elif self.assumptions is not None and self.assumptions.verdict:
-            verdict = "; ".join(self.assumptions.verdict)
+        elif self.diagnosis:
+            verdict = "; ".join(self.diagnosis.verdict)
             warnings.append(f"the readings contradict the experiment: {verdict}")
         if self.without_scatter:
             warnings.append(
@@ -505,32 +498,10 @@ class Fit(FitResult):
         """S^2 against its degrees of freedom."""
         return lack_of_fit(self.sum_of_squares, self.sum_freedom, self.diagnosis, self.untested)
 
-    @cached_property
-    def assumptions(self) -> AskedAssumptions | None:
-        """What the readings say of each assumption of the experiment; None if they were not asked.
-
-        >>> import ballplate as bp
-        >>> fit = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart()))
-        >>> fit.assumptions.verdict
-        ()
-        """
-        asked = optional_service("assumptions_asked")
-        found: AskedAssumptions | None = asked(self) if asked and self.converged else None
-        return found
-
     @property
     def without_scatter(self) -> bool:
         """Whether sigma is estimated from residuals that are rounding errors."""
         return self.sigma_is_estimated and self.sigma < LEAST_SIGMA
-
-    @property
-    def _suspicion(self) -> Suspicion | None:
-        """The diagnosis, but for residuals without a gross error that a contradicted assumption
-        explains.
-        """
-        found = self.diagnosis
-        is_explained = self.assumptions is not None and self.assumptions.explains
-        return None if found and not found.names_causes and is_explained else found
 
     def _residual_groups(self) -> dict[str, list[dict[str, Any]]]:
         """Residuals by group as plain data; empty without results."""

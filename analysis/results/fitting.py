@@ -52,9 +52,8 @@ def fit(
             *names, observed, solution, judged, 1.0, False, 0, {}, (), (), experiment=experiment
         )
     at = linearised_fit(design, solution)
-    own_freedom = at.degrees_of_freedom
     scale, estimated, freedom = _sigma(at, campaigns, is_estimated)
-    diagnosis, untested = diagnosed(at, observed.x, own_freedom, estimated)
+    diagnosis, untested = diagnosed(at, observed.x, estimated, observed.marks)
     judged = verdict(at, experiment.expected_rank_deficiency, experiment.target_uncertainty)
     functions = estimated_functions(at, monomials)
     return Fit(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -31,7 +30,6 @@ from ballplate.simulator.readings.fingerprints import fingerprint, position_fing
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 
 from .estimates import ParameterEstimate
-from .extension_results import AskedAssumptions
 
 if TYPE_CHECKING:
     from ballplate.simulator.experiment.model import Experiment
@@ -76,8 +74,6 @@ class MappedFit(Protocol):
     @property
     def lack_of_fit(self) -> LackOfFit: ...
     @property
-    def assumptions(self) -> AskedAssumptions | None: ...
-    @property
     def estimates(self) -> tuple[ParameterEstimate, ...]: ...
     @property
     def functions(self) -> EstimatedFunctions: ...
@@ -91,7 +87,7 @@ def map_of(fit: MappedFit, date: str | None = None) -> FittedMap:
     """
     if date is not None:
         parse_day(date)
-    at, experiment, asked = fit.functions.at, fit.experiment, fit.assumptions
+    at, experiment = fit.functions.at, fit.experiment
     assert experiment is not None
     design, layout, state = at.design, at.layout, at.state
     offsets = layout.offset_columns[design.probes.free]
@@ -123,9 +119,7 @@ def map_of(fit: MappedFit, date: str | None = None) -> FittedMap:
             _left_out(estimate) for estimate in fit.estimates if estimate.kind == "influence"
         ),
         data=data_of(fit.observed, experiment),
-        lack_of_fit=replace(fit.lack_of_fit, contradicted=asked.verdict)
-        if asked
-        else fit.lack_of_fit,
+        lack_of_fit=fit.lack_of_fit,
         experiment=fit.label,
         program=f"ballplate {version('ballplate')}",
         date=date,

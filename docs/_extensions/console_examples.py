@@ -82,8 +82,8 @@ LOADED_BEFORE = (
 
 # Lines that no example leaves out, and how a line begins that goes on with the one before.
 ALARM = re.compile(
-    r"^(\S+: )?(warning|suspected|reason|note|rank deficiency|weakly determined|Too optimistic)\b"
-    r"|^<-|cannot follow|did not converge|\bNOT?\b"
+    r"^(\S+: )?(warning|reason|note|rank deficiency|weakly determined|Too optimistic)\b"
+    r"|^contradicted\b|^<-|cannot follow|did not converge|\bNOT?\b"
 )
 CONTINUED = re.compile(r"^  (?! )")
 

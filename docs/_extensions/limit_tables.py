@@ -6,9 +6,9 @@ A page says `<!-- limits of files -->`, of experiments or of commands, where the
 from __future__ import annotations
 
 from ballplate.estimators import distances as estimators
+from ballplate.extensions.diagnosis import remainders
 from ballplate.extensions.maps import correction
 from ballplate.extensions.maps import volumetric_errors as volumetric
-from ballplate.extensions.reliability import remainders
 from ballplate.extensions.requirements import root_search
 from ballplate.extensions.splines import error_curve, read_points
 from ballplate.extensions.sweeps import axes, bundle, load, sweep_settings

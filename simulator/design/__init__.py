@@ -24,15 +24,12 @@ if TYPE_CHECKING:
     )
     from .influences.displacements import SharedDisplacements
     from .influences.drift import (
-        Clock,
         Drift,
         even_clock,
     )
-    from .influences.position_scale import PositionScale
     from .influences.protocol import (
         DesignParts,
         Disturbed,
-        Influence,
         InfluenceParameter,
         InfluenceSettings,
     )

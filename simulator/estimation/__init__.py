@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     )
     from .gauss_newton import (
         Solution,
-        as_drawn,
         estimate,
         linearised_fit,
         moved,

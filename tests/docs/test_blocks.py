@@ -92,7 +92,7 @@ def test_no_alarm_is_left_out() -> None:
         "converged in 4 iterations",
         "x",
         "  y",
-        "suspected: ball r3c5 read too high",
+        "contradicted: ball r3c5 read too high",
         "  (statistic 14.8)",
         "    1  2",
         "warning: the scale",

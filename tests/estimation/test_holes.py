@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 import yaml
 from ballplate import compare
+from ballplate.extensions.diagnosis.redundancy import reliability
 from ballplate.extensions.laboratory.gross_errors import find_gross_errors
-from ballplate.extensions.reliability.redundancy import reliability
 from ballplate.results.checked_designs import predict
 from ballplate.results.fitting import fit
 from ballplate.simulator.design.arrays import Design, nominal_state

@@ -13,7 +13,7 @@ from typing import Any
 import ballplate as bp
 import numpy as np
 import pytest
-from ballplate.extensions.reliability.hat import whitened_residuals
+from ballplate.extensions.diagnosis.hat import whitened_residuals
 from ballplate.results.fitting import fit
 from ballplate.results.sigmas_by_campaign import compared
 from ballplate.simulator.design.parameters import shared_layout

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import ballplate as bp
 import pytest
-from ballplate.extensions.reliability import wording
+from ballplate.extensions.diagnosis import wording
 from ballplate.simulator.design.observations import calibration, radius
 
 from tests.mutation.forks import change, in_fork, probed

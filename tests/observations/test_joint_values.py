@@ -11,7 +11,7 @@ import ballplate as bp
 import numpy as np
 import pytest
 import yaml
-from ballplate.extensions.reliability.redundancy import reliability
+from ballplate.extensions.diagnosis.redundancy import reliability
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.joint_values import JointValues
 from ballplate.simulator.estimation.gauss_newton import estimate

@@ -10,7 +10,7 @@ from typing import Any
 import ballplate as bp
 import numpy as np
 import pytest
-from ballplate.extensions.reliability.redundancy import reliability
+from ballplate.extensions.diagnosis.redundancy import reliability
 from ballplate.simulator.design.observations.joint_values import JointValues
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load

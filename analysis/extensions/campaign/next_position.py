@@ -87,7 +87,7 @@ def next_step(
             math.isfinite(bound)
             and judge(goal, _uncertainty(linearisation, experiment, goal, bound)).is_met
         )
-        suspected = tuple(fit.diagnosis.words(observed.marks)) if fit.diagnosis else ()
+        suspected = tuple(found.words for found in fit.diagnosis.findings) if fit.diagnosis else ()
         step = replace(
             step,
             sigma=sigma,

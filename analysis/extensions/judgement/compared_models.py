@@ -11,11 +11,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from ballplate.extensions.questions.asking import answers_at
-from ballplate.extensions.reliability.exact_values import diagnosis_of_all
-from ballplate.extensions.reliability.refits import diagnosis_with_refits
-from ballplate.extensions.reliability.remainders import too_many_entries
-from ballplate.extensions.reliability.wording import refit_words
+from ballplate.extensions.diagnosis.remainders import too_many_entries
+from ballplate.extensions.diagnosis.searched_fit import diagnosed
 from ballplate.presentation import chance_words
 from ballplate.simulator.computing import ProgressStep, Report, single_threaded, unreported
 from ballplate.simulator.design import Design, State
@@ -234,12 +231,9 @@ def _mistakes(fit: RungFit, x: Array, is_given: bool) -> tuple[str, ...]:
     square, freedom = fit.sum_of_squares, fit.degrees_of_freedom
     if too_many_entries(fit.at.design) or chance_of(square, freedom, 0.0, 0, True) > MISFIT:
         return ()
-    diagnosis = diagnosis_with_refits(fit.at, x, freedom, not is_given)
-    if diagnosis.refit:
-        return (refit_words(diagnosis.refit),)
-    answers = answers_at(fit.at, x, not is_given, diagnosis)
-    found = () if answers is None else answers.contradicted
-    return tuple(each.words for each in found if not each.may_be_model)
+    diagnosis, _ = diagnosed(fit.at, x, not is_given)
+    named = (each for each in diagnosis.findings if not each.is_gross and not each.may_be_model)
+    return tuple(each.words for each in named if each.kind != "scatter")
 
 
 def _faults(fit: RungFit, x: Array, repeats: PureError, is_given: bool) -> tuple[str, ...]:
@@ -255,8 +249,8 @@ def _faults(fit: RungFit, x: Array, repeats: PureError, is_given: bool) -> tuple
     if is_given and chance_of(square, freedom, 0.0, 0, True) < MISFIT:
         faults.append(f"S^2 is {square / freedom:.3g} times its value for the stated uncertainties")
     if not too_many_entries(design):
-        unexplained = diagnosis_of_all(fit.at, x, freedom, not is_given).unexplained
-        if unexplained is not None and (unexplained.words or unexplained.too_large):
-            words = unexplained.words or "no single error of the kinds that are looked for"
-            faults.append(f"the residuals have a structure; what explains most of it is {words}")
+        diagnosis, _ = diagnosed(fit.at, x, not is_given)
+        for each in diagnosis.findings:
+            if each.is_model:
+                faults.append(f"the residuals have a structure: {each.cause}")
     return tuple(faults)

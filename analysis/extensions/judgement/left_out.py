@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from ballplate.extensions.reliability.hat import hat_rows, row_count, row_places, whitened_residuals
+from ballplate.extensions.diagnosis.hat import hat_rows, row_count, row_places, whitened_residuals
 from ballplate.results import campaign_sigmas
 from ballplate.simulator.computing import ProgressStep, Report, single_threaded, unreported
 from ballplate.simulator.design import (

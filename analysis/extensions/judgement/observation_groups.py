@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
-from ballplate.extensions.reliability.hat import row_places
+from ballplate.extensions.diagnosis.hat import row_places
 from ballplate.simulator.design import Design, Observations, measured
 from ballplate.simulator.geometry import AXIS_NAMES
 from ballplate.simulator.machines import Integers

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.extensions.reliability.hat import hat_rows, row_count, row_places
+from ballplate.extensions.diagnosis.hat import hat_rows, row_count, row_places
 from ballplate.simulator.computing import single_threaded
 from ballplate.simulator.design import (
     CalibratedCoordinates,

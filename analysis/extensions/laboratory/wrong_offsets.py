@@ -11,20 +11,13 @@ from dataclasses import dataclass, replace
 from itertools import chain, combinations
 
 import numpy as np
-from ballplate.simulator.computing import lstsq
 from ballplate.simulator.design import (
     Design,
     Priors,
-    measured,
-    read_in_positions,
-    seen_places,
 )
 from ballplate.simulator.geometry import AXIS_NAMES
 from ballplate.simulator.inputs import listing
 from ballplate.simulator.machines import Array
-
-from .consensus import consensus_motion
-from .gross_errors import AGAINST_DRAWING, ball_pitches
 
 
 @dataclass(frozen=True)
@@ -87,32 +80,3 @@ def discrete_mistakes(design: Design) -> Iterator[WrongOffsets]:
         )
         if change.any() and {first, second} & set(probes_read):
             yield WrongOffsets((first, second), change)
-
-
-def offset_shifts(design: Design, x: Array) -> Array:
-    """Return the least change (l, d) of the offsets with which readings of plates by several probes
-    in one position agree best, from scale readings x (m, d).
-    """
-    pitch, readings = ball_pitches(design), design.readings
-    is_read, places_seen = measured(design, readings), seen_places(design, readings, x)
-    by_probe, apart, read = [], [], []
-    for k, mine, nominal in read_in_positions(design, readings):
-        probe = readings.probe[mine]
-        several = np.unique(probe)
-        if len(several) < 2 or not design.artefacts.is_plate[design.positions.artefact[k]]:
-            continue
-        is_common = probe == int(np.argmax(np.bincount(probe)))
-        reach = AGAINST_DRAWING * pitch[readings.ball[mine[is_common]]]
-        rotation, _, _ = consensus_motion(nominal[is_common], places_seen[mine[is_common]], reach)
-        off = places_seen[mine] - nominal @ rotation.T
-        places = np.array([np.median(off[probe == each], axis=0) for each in several])
-        columns = np.eye(len(design.probes.names))[several]
-        by_probe.append(columns - columns.mean(axis=0))
-        apart.append(places - places.mean(axis=0))
-        read.append(np.tile(is_read[mine[0]], (len(several), 1)))
-    shifts = np.zeros_like(design.probes.offsets)
-    if apart:
-        columns, places, is_axis_read = (np.concatenate(each) for each in (by_probe, apart, read))
-        for axis, rows in enumerate(is_axis_read.T):
-            shifts[:, axis] = -lstsq(columns[rows], places[rows, axis], rcond=1e-9)[0]
-    return shifts

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from ballplate.extensions.reliability.hat import hat_rows, row_count, row_places
+from ballplate.extensions.diagnosis.hat import hat_rows, row_count, row_places
 from ballplate.results import Fit
 from ballplate.simulator.computing import single_threaded
 from ballplate.simulator.design import (

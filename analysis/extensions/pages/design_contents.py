@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from ballplate.extensions.campaign.sheet import sheet_of
+from ballplate.extensions.diagnosis.redundancy import reliability_of
 from ballplate.extensions.maps.length_map import length_map
 from ballplate.extensions.pages.design_page import DesignContents, design_page
 from ballplate.extensions.pages.page_facts import assumptions, target_in_words, unjudged
-from ballplate.extensions.reliability.redundancy import reliability_of
 from ballplate.planning import Wanted, checked_design
 from ballplate.results import Prediction
 from ballplate.simulator.computing import Report, unreported

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from ballplate.extensions.reliability.redundancy import reliability_of
+from ballplate.extensions.diagnosis.redundancy import reliability_of
 from ballplate.results import Fit, labels, reading_residuals
 from ballplate.simulator.design import measured
 

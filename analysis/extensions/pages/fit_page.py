@@ -14,11 +14,10 @@ from .document import Page, PageSection, facts_list, introduction, written
 from .elements import Html, element, joined, note, sentence, table
 from .quoted import QuotedData
 from .residual_sections import (
-    answers_section,
+    diagnosis_section,
     reliability_section,
     residual_charts,
     residual_tables,
-    suspects_section,
 )
 from .uncertainty_sections import (
     estimates_table,
@@ -113,9 +112,8 @@ def _results(fit: QuotedData, contents: FitContents) -> list[PageSection]:
         ),
         PageSection("curves", "Error curves", curves_section(fit)),
         PageSection(
-            "suspected", "Suspected gross errors", suspects_section(fit, contents.untested)
+            "asked", "What the readings contradict", diagnosis_section(fit, contents.untested)
         ),
-        PageSection("asked", "What the readings say of the assumptions", answers_section(fit)),
         PageSection("residuals", "Residuals", of_residuals),
         PageSection("reliability", "Reliability", reliability),
         PageSection("adjustments", "Adjustments", _adjustments(fit)),
@@ -131,8 +129,7 @@ def _is_good(data: Mapping[str, Any]) -> bool:
         or data["complaint"]
         or data["weakly_determined"]
         or data["too_large"]
-        or data.get("suspected")
-        or data.get("assumptions", {}).get("contradicted")
+        or data.get("diagnosis", {}).get("contradicted")
         or data["warnings"]
     )
     return not wrong and not misses_target(data)
@@ -157,8 +154,8 @@ def _verdict(fit: QuotedData, contents: FitContents) -> Html:
     if weak:
         many = "s are" if weak > 1 else " is"
         rank = joined([rank, f", {weak} direction{many} weakly determined"])
-    count = len(data.get("suspected", ()))
-    suspects = f", and {count} cause{'s are' if count > 1 else ' is'} suspected" if count else ""
+    count = len(data.get("diagnosis", {}).get("contradicted", ()))
+    suspects = f", and the readings contradict {count} time{'s' * (count > 1)}" if count else ""
     estimated = "estimated from the residuals" if data["sigma_is_estimated"] else "as given"
     first = sentence(
         rank,

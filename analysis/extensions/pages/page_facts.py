@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from ballplate.extensions.diagnosis.remainders import too_many_entries
 from ballplate.extensions.maps.length_map import target_words
-from ballplate.extensions.reliability.remainders import too_many_entries
 from ballplate.presentation import uncertainty_words
 from ballplate.simulator.design import Design
 from ballplate.simulator.experiment import Experiment

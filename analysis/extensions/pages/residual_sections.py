@@ -111,33 +111,27 @@ def residual_tables(fit: QuotedData) -> Html:
     return joined(parts)
 
 
-def suspects_section(fit: QuotedData, untested: str) -> Html:
-    """Section on flagged readings, or why the residuals were not tested."""
+def diagnosis_section(fit: QuotedData, untested: str) -> Html:
+    """Section on what the readings contradict, and the answer to each assumption, or why the
+    residuals were not tested.
+    """
     if untested:
         return sentence(f"Not tested: {untested}.")
-    if "suspected" not in fit:
-        return sentence("No test of the residuals exceeds its limit.")
-    items = (element("li", suspect.text("words")) for suspect in fit.at("suspected").each())
-    return element("ol", *items)
-
-
-def answers_section(fit: QuotedData) -> Html:
-    """Section on what the readings contradict, and the answer to each assumption."""
-    if "assumptions" not in fit:
+    if "diagnosis" not in fit:
         return Html()
-    answers = fit.at("assumptions")
-    items = [element("li", each.text("words")) for each in answers.at("contradicted").each()]
-    first = sentence("The readings contradict no assumption.")
+    diagnosis = fit.at("diagnosis")
+    items = [element("li", each.text("words")) for each in diagnosis.at("contradicted").each()]
+    first = sentence("The readings contradict nothing.")
     if items:
         first = joined([sentence("The readings contradict:"), element("ol", *items)])
     rows = []
-    for each in answers.at("asked").each():
+    for each in diagnosis.at("tested").each():
         size, unit = each.amount("noticed_from", "unit")
         noticed = joined([size, f" {unit}"]) if each.data["noticed_from"] is not None else "-"
         not_seen = listing(each.data["not_seen"], 4)
-        rows.append([each.text("assumed"), each.number("chance", digits=2), noticed, not_seen])
+        rows.append([each.text("assumed"), each.number("p_value", digits=2), noticed, not_seen])
     heads = ["assumption tested", "p-value", "smallest effect that would show", "cannot be tested"]
-    words = "Noticed in four of five campaigns; chance: of a larger effect if the assumption holds."
+    words = "Noticed in four of five campaigns; p-value: of a larger effect if it is right."
     return joined([first, table("answers", "Assumptions", heads, rows, (0, 3)), note(words)])
 
 

@@ -1,0 +1,1 @@
+"""Diagnosis: what the residuals of a fit contradict, and what gross errors would do unnoticed."""

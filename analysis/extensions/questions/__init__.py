@@ -1,1 +1,0 @@
-"""What an estimate takes for granted, asked of its readings."""

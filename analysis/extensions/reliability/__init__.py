@@ -1,1 +1,0 @@
-"""Reliability: gross errors that residuals reveal, and effects of undetected ones."""

@@ -1,0 +1,275 @@
+"""`ballplate run --reliability`, and what `fit` suspects, as their users see them."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from ballplate.cli import main
+
+QUICKSTART = "designs/quickstart.yaml"
+Rows = list[dict[str, str]]
+
+
+def test_table_of_the_quickstart(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    table = tmp_path / "all.csv"
+    assert main(["run", "--reliability", QUICKSTART, "-o", str(table)]) == 0
+    out = capsys.readouterr().out
+    assert "754 observations; redundancy 580.0 in total" in out
+    assert "estimated from the other residuals: 4.152 standard deviations" in out
+    assert "cannot be detected, harmless: offset x of probe down, offset y of probe down" in out
+    assert "DANGEROUS" not in out and "scale of the certificate of plate" in out
+    rows = list(csv.DictReader(table.read_text(encoding="utf-8").splitlines()))
+    singles = [row for row in rows if row["redundancy"]]
+    assert len(rows) > len(singles) == 754
+    assert {row["unit"] for row in singles} == {"m"} and "MDB, µm" in out
+    assert sum(float(row["redundancy"]) for row in singles) == pytest.approx(580.0)
+    worst = max(
+        (row for row in rows if row["kind"] == "reading"),
+        key=lambda row: float(row["minimal detectable"]),
+    )
+    assert all(word in worst["name"] for word in ("z high", "r1c1", "x"))
+
+
+def test_a_length_that_nothing_checks_is_dangerous(capsys: pytest.CaptureFixture[str]) -> None:
+    assert (
+        main(
+            [
+                "run",
+                "--reliability",
+                "designs/hurt_foss/bar-bell.yaml",
+                "--variant",
+                "length known",
+                "--json",
+            ]
+        )
+        == 0
+    )
+    found = json.loads(capsys.readouterr().out)
+    by_name = {event["name"]: event for event in found["events"]}
+    certificate = by_name["certified length 1-2 of bar"]
+    assert certificate["minimal_detectable"] is None and certificate["harmless"] is False
+    # The longest distance between two evaluation points is about two and a half bars long.
+    assert 2.0 < certificate["effects"]["U6"]["per_unit"] < 3.0
+    assert by_name["offset x of probe cone"]["harmless"] is True
+    assert found["redundancy"] == pytest.approx(found["degrees_of_freedom"])
+
+
+def test_sigma_given_is_the_normal_test(capsys: pytest.CaptureFixture[str]) -> None:
+    options = ["--sigma", "given", "--false-alarm", "5%", "--power", "90%", "--json"]
+    assert (
+        main(
+            [
+                "run",
+                "--reliability",
+                "designs/hurt_foss/bar-bell.yaml",
+                "--variant",
+                "flat",
+                *options,
+            ]
+        )
+        == 0
+    )
+    assert json.loads(capsys.readouterr().out)["noncentrality"] == pytest.approx(
+        1.959964 + 1.281552, abs=1e-4
+    )
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        (["--power", "0.8"], 'expected a percentage between 0% and 100%, such as 0.1%, not "0.8"'),
+        (["--false-alarm", "90%"], "--power must be above --false-alarm"),
+    ],
+)
+def test_wrong_shares(options: list[str], told: str, capsys: pytest.CaptureFixture[str]) -> None:
+    try:
+        status = main(["run", "--reliability", QUICKSTART, *options])
+    except SystemExit as left:
+        status = int(str(left.code))
+    assert status == 2 and told in capsys.readouterr().err
+
+
+def test_one_table_is_of_one_experiment(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert (
+        main(
+            [
+                "run",
+                "--reliability",
+                "designs/hurt_foss/bar-bell.yaml",
+                "-o",
+                str(tmp_path / "t.csv"),
+            ]
+        )
+        == 2
+    )
+    assert "choose one with --variant: length known, " in capsys.readouterr().err
+    own = tmp_path / "own.yaml"
+    own.write_text(Path(QUICKSTART).read_text(encoding="utf-8"), encoding="utf-8")
+    assert main(["run", "--reliability", str(own), "-o", str(own)]) == 2
+    assert "would overwrite" in capsys.readouterr().err
+    assert main(["run", "--reliability", QUICKSTART, "-o", str(tmp_path / "no" / "t.csv")]) == 3
+    assert "cannot be written" in capsys.readouterr().err
+
+
+@pytest.fixture(scope="module")
+def clean(tmp_path_factory: pytest.TempPathFactory) -> Rows:
+    path = tmp_path_factory.mktemp("readings") / "readings.csv"
+    assert main(["simulate", QUICKSTART, "-o", str(path)]) == 0
+    return list(csv.DictReader(path.read_text(encoding="utf-8").splitlines()))
+
+
+def add(row: dict[str, str], column: str, micrometres: float) -> None:
+    row[column] = repr(float(row[column]) + 1e-3 * micrometres)
+
+
+def nothing(rows: Rows) -> None:
+    pass
+
+
+def one_reading(rows: Rows) -> None:
+    add(rows[39], "y_mm", 3.0)
+
+
+def three_readings(rows: Rows) -> None:
+    for i, column, size in ((5, "z_mm", 2.0), (98, "x_mm", -2.0), (200, "y_mm", 2.5)):
+        add(rows[i], column, size)
+
+
+def slip(rows: Rows) -> None:
+    for row in [row for row in rows if row["position"] == "z high"][12:]:
+        add(row, "y_mm", 1.2)
+
+
+def probe(rows: Rows) -> None:
+    for row in rows:
+        if row["probe"] == "left":
+            add(row, "z_mm", -2.0)
+
+
+def dirt(rows: Rows) -> None:
+    for row in rows:
+        if row["position"] == "x low" and row["ball"] == "r3c2":
+            add(row, "y_mm", 1.5)
+
+
+def warm(rows: Rows) -> None:
+    """The plate is larger by 3 ppm in one position."""
+    for row in rows:
+        if row["position"] == "z low":
+            add(row, "x_mm", 3e-3 * float(row["x_mm"]))
+            add(row, "y_mm", 3e-3 * float(row["y_mm"]))
+
+
+def warm_twice(rows: Rows) -> None:
+    """The plate is larger by 2 ppm in two positions, one after the other."""
+    for row in rows:
+        if row["position"] in ("x high", "y low"):
+            for column in ("x_mm", "y_mm", "z_mm"):
+                add(row, column, 2e-3 * float(row[column]))
+
+
+def loose_ball(rows: Rows) -> None:
+    """A ball stands 1.5 um out of the plate from one position on."""
+    for row in rows:
+        if row["position"] in ("y low", "y high") and row["ball"] == "r2c4":
+            add(row, "y_mm", 1.5)
+
+
+def late_slip(rows: Rows) -> None:
+    for row in [row for row in rows if row["position"] == "x low"][33:]:
+        add(row, "z_mm", -0.8)
+
+
+def restless(rows: Rows) -> None:
+    """Noise is three times as large in one position."""
+    generator = np.random.default_rng(4)
+    for row in rows:
+        if row["position"] == "x high":
+            for column in ("x_mm", "y_mm", "z_mm"):
+                add(row, column, 0.2 * 8.0**0.5 * generator.standard_normal())
+
+
+def waves(rows: Rows) -> None:
+    for row in rows:
+        add(row, "x_mm", math.sin(float(row["x_mm"]) / 40.0))
+
+
+@pytest.mark.parametrize(
+    ("spoil", "told", "sizes"),
+    [
+        (nothing, [], []),
+        (
+            one_reading,
+            [
+                r"reading of ball r3c5 in position z high with down \(y .* leave out line 41 of r.csv"
+            ],
+            [3e-6],
+        ),
+        (three_readings, [" line 7 of", " line 100 of", " line 202 of"], [2e-6, -2e-6, 2.5e-6]),
+        (
+            slip,
+            [r"plate slipped in position z high between lines 3[678] and (39|40) of r.csv \(.*y 1"],
+            [1.2e-6],
+        ),
+        (probe, ["offset of probe (left|right), or offset of probe "], [2e-6]),
+        (dirt, ["ball r3c2 in position x low.* clean the ball, .* lines 63 and 88 of"], [1.5e-6]),
+        (
+            warm_twice,
+            ["size of plate in position x high and size of plate in position y low "],
+            [2e-6],
+        ),
+        (loose_ball, ["ball r2c4 displaced from position y low on"], [1.5e-6]),
+        (late_slip, ["slipped in position x low between lines 8[0-5] and 8[5-9] of"], [-0.8e-6]),
+        (warm, ["size of plate in position z low .* check the temperature there"], [3e-6]),
+        (restless, ["readings in position x high vary [23].* times as much"], [None]),
+        (waves, ["the error model lacks an error in x that depends on x"], [None]),
+    ],
+)
+def test_what_a_fit_contradicts(
+    spoil: Callable[[Rows], None],
+    told: list[str],
+    sizes: list[float | None],
+    clean: Rows,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    # With hundreds of degrees of freedom both tests find the same.
+    sigma = "given" if spoil in (nothing, dirt, three_readings, late_slip) else "estimated"
+    found = suspected(spoil, sigma, clean, tmp_path, capsys)
+    words = [one["words"] for one in found]
+    assert len(words) == len(told), words
+    for pattern, size in zip(told, sizes, strict=True):
+        (one,) = (one for one in found if re.search(pattern, one["words"]))
+        assert one["p_value"] < 0.01
+        if size is not None:
+            best = max(
+                one["sizes"], key=lambda each: abs(each["value"]) / each["standard_uncertainty"]
+            )
+            value = best["value"] if spoil in (three_readings, late_slip) else abs(best["value"])
+            assert abs(value - size) < 3.5 * best["standard_uncertainty"]
+
+
+def suspected(
+    spoil: Callable[[Rows], None],
+    sigma: str,
+    clean: Rows,
+    folder: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> list[dict[str, Any]]:
+    rows = [dict(row) for row in clean]
+    spoil(rows)
+    with (folder / "r.csv").open("w", encoding="utf-8", newline="") as stream:
+        writer = csv.DictWriter(stream, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+    assert main(["fit", QUICKSTART, str(folder / "r.csv"), "--sigma", sigma, "--json"]) == 0
+    found: list[dict[str, Any]] = json.loads(capsys.readouterr().out)["diagnosis"]["contradicted"]
+    return found
