@@ -18,6 +18,7 @@ from ballplate.simulator.estimation.gauss_newton import (
     gauss_newton,
     linearised_fit,
 )
+from ballplate.simulator.estimation.implied_values import implied_values
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.maps.fitted_map import LEAST_SIGMA
@@ -188,6 +189,7 @@ def _without_maps(
     drawn = as_drawn(without)
     fit = gauss_newton(without, x, solution.state, held_spectrum=drawn)
     freedom = without.observation_count - without.parameter_count + drawn.deficiency
+    freedom -= implied_values(without, fit.state.balls)
     if fit.status != "converged" or freedom <= 0:
         return math.nan, 0
     return math.sqrt(fit.factor.sum_of_squares / freedom), freedom

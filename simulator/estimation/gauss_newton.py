@@ -16,6 +16,7 @@ from ..machines.protocol import Array
 from .covariance import Spectrum, no_spectrum, spectrum
 from .elimination import Factor, eliminate
 from .graded import triangle
+from .implied_values import implied_values
 from .initial import initial_state
 from .linearisation import Linearisation, linearise
 from .substitution import in_order, solve_balls, solve_kept, solve_shared
@@ -148,6 +149,7 @@ def _tells_of_open(
     from scipy.special import fdtrc
 
     freedom = design.observation_count - design.parameter_count
+    freedom -= implied_values(design, followed.state.balls)
     if freedom <= 0:
         return False
     sum_left = followed.factor.sum_of_squares
@@ -170,9 +172,9 @@ def as_drawn(design: Design) -> Spectrum:
 def linearised_fit(design: Design, solution: Solution) -> Linearisation:
     """Return the linearisation at an estimate, with the null directions of the nominal design."""
     drawn = linearise(design) if solution.spectrum.deficiency else None
-    return Linearisation(
-        design, solution.factor.layout, solution.state, solution.factor, solution.spectrum, drawn
-    )
+    layout, state = solution.factor.layout, solution.state
+    implied = implied_values(design, state.balls)
+    return Linearisation(design, layout, state, solution.factor, solution.spectrum, drawn, implied)
 
 
 def newton_step(design: Design, factor: Factor, spectrum: Spectrum) -> tuple[Array, Array]:

@@ -35,7 +35,7 @@ class Linearisation:
     Square roots of covariances are in units of the standard deviation of a unit-weight
     observation. After a fit, the undetermined directions are those of the nominal design: `drawn`
     is then the linearisation there, at whose state functions are tested for changes along null
-    directions.
+    directions, and `implied` counts certified values that follow from others.
     """
 
     design: Design
@@ -44,6 +44,7 @@ class Linearisation:
     factor: Factor
     spectrum: Spectrum
     drawn: Linearisation | None = None
+    implied: int = 0
 
     @property
     def deficiency(self) -> int:
@@ -52,7 +53,12 @@ class Linearisation:
     @property
     def degrees_of_freedom(self) -> int:
         """Observations less the parameters that they determine."""
-        return self.design.observation_count - self.design.parameter_count + self.deficiency
+        return self.count - self.design.parameter_count + self.deficiency
+
+    @property
+    def count(self) -> int:
+        """Number of scalar observations that have errors of their own."""
+        return self.design.observation_count - self.implied
 
     @property
     def rank(self) -> int:

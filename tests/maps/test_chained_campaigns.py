@@ -245,9 +245,11 @@ def test_the_linear_chain_is_that_of_full_fits(
     (ratio,) = found.campaigns.ratios.values()
     is_common = factors[0] == factors[1]
     assert found.campaigns.maps[0].is_common == is_common
-    freedom = min(linear.first_freedom, linear.own_freedom)
+    # Four balls in a plane have five distances that do not follow from others.
+    first_freedom = linear.first_freedom - 1
+    freedom = min(first_freedom, linear.own_freedom)
     if is_common:
-        freedom = linear.first_freedom + linear.own_freedom + linear.shared_freedom
+        freedom = first_freedom + linear.own_freedom + linear.shared_freedom
     assert found.degrees_of_freedom == freedom
     lengths = bp.correct(found.to_map(), ENDS, lengths=LENGTHS).lengths
     both = (*lengths, *found.certificate().distances)

@@ -59,7 +59,7 @@ class RungFit:
         """Schwarz's criterion of a normal likelihood with all parameters, sigma among them unless
         it is given.
         """
-        count = self.at.design.observation_count
+        count = self.at.count
         parameters, misfit = count - self.degrees_of_freedom, self.sum_of_squares
         if not is_given:
             parameters += 1
