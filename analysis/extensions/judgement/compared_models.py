@@ -251,6 +251,6 @@ def _faults(fit: RungFit, x: Array, repeats: PureError, is_given: bool) -> tuple
     if not too_many_entries(design):
         diagnosis, _ = diagnosed(fit.at, x, not is_given)
         for each in diagnosis.findings:
-            if each.is_model:
-                faults.append(f"the residuals have a structure: {each.cause}")
+            if each.may_be_model:
+                faults.append(f"the residuals have a structure: {each.verdict}")
     return tuple(faults)

@@ -301,7 +301,7 @@ def test_a_template_that_is_filled_in_fits_as_the_readings_do(
         assert main(["fit", file, str(path), "--json"]) in (0, 1)
         fits.append(json.loads(capsys.readouterr().out))
         # What readings say of a drift is that of their order.
-        answers = fits[-1].get("assumptions", {}).get("asked", [])
+        answers = fits[-1]["diagnosis"]["tested"]
         answers[:] = [answer for answer in answers if answer["assumed"] != "drift"]
     assert fits[0].keys() == fits[1].keys() and "degrees_of_freedom" in fits[0]
     assert close(fits[0], fits[1])

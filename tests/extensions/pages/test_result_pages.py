@@ -214,13 +214,17 @@ def test_a_fit_that_fails_has_a_page_that_says_so(fitted: bp.Fit) -> None:
 
 
 def test_a_page_does_not_call_good_what_was_not_tested(fitted: bp.Fit) -> None:
-    assert 'class="verdict"' in fitted.page() and wording.NO_TEST_OF_THE_RESIDUALS in fitted.page()
+    assert (
+        'class="verdict"' in fitted.page()
+        and wording.THE_READINGS_CONTRADICT_NOTHING in fitted.page()
+    )
     untested = replace(fitted, untested="too many entries").page()
     assert wording.NOT_TESTED_TOO_MANY_ENTRIES in untested
     exact = replace(fitted, degrees_of_freedom=0, sigma_is_estimated=False, sigma=1.0)
     page = exact.page()
     assert (
-        wording.NO_TEST_OF_THE_RESIDUALS not in page and wording.NO_LARGER_THAN_STATED not in page
+        wording.THE_READINGS_CONTRADICT_NOTHING not in page
+        and wording.NO_LARGER_THAN_STATED not in page
     )
     assert 'class="verdict bad"' in page and wording.THERE_IS_NO_REDUNDANCY in page
 
