@@ -90,9 +90,9 @@ def words_of(biases: Patterns, columns: Integers) -> str:
         artefact = design.artefacts.names[subject]
         return f"scale of the certificate of {artefact}, or its temperature in all positions"
     if kind == "expansion":
-        names, artefact = design.positions.names, design.positions.artefact
+        names, artefacts = design.positions.names, design.positions.artefact
         return " and ".join(
-            f"size of {design.artefacts.names[artefact[k]]} in position {names[k]}"
+            f"size of {design.artefacts.names[artefacts[k]]} in position {names[k]}"
             for k in biases.subject[columns].tolist()
         )
     if kind == "slip":
@@ -139,7 +139,7 @@ def _sizes(
             elif len(found.columns) > 1 and not letter:
                 letter = name(biases, k)
         if u > 0.0:
-            yield ParameterEstimate(letter, value, u, unit, "cause")
+            yield ParameterEstimate(letter, value, u, unit)
 
 
 def _moment(biases: Patterns, found: FoundCause, marks: Sequence[Mark]) -> str:
