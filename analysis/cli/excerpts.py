@@ -17,10 +17,10 @@ def print_errors(messages: Iterable[Message], options: Namespace) -> None:
     """Print errors on standard error, a line each; at a terminal, and with --verbose, with the
     lines of the files.
     """
-    from ballplate.simulator.inputs.messages import in_one_line
+    from ballplate.simulator.inputs.messages import folded, in_one_line
 
     with_lines = options.verbose or sys.stderr.isatty()
-    for message in messages:
+    for message in folded(messages):
         print(message, file=sys.stderr)
         if with_lines and message.line:
             with suppress(OSError, ValueError, IndexError):

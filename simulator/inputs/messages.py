@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field, replace
 
 Step = str | int
 Steps = tuple[Step, ...]
@@ -12,6 +12,9 @@ Steps = tuple[Step, ...]
 # Errors reported of a file; more are repetitions of one error.
 MOST_MESSAGES = 1000
 MORE_ERRORS = f"more than {MOST_MESSAGES} errors; mend these first"
+
+# Messages that only differ in the line are told one by one if there are no more than these.
+FEW_ALIKE = 3
 
 # Characters that would break a line or reach the terminal as a command.
 # Beginning of a line that a workflow of GitHub takes as a command.
@@ -42,14 +45,34 @@ class Message:
 
 
 class ExperimentError(Exception):
-    """An experiment file cannot be used; ``messages`` has all reasons in the order of lines."""
+    """An experiment file cannot be used; ``messages`` has all reasons in the order of lines, and its
+    text the first of those that are alike.
+    """
 
     def __init__(self, messages: Iterable[Message]) -> None:
         self.messages: tuple[Message, ...] = tuple(messages)
-        super().__init__("\n".join(str(message) for message in self.messages))
+        super().__init__("\n".join(map(str, folded(self.messages))))
 
     def __reduce__(self) -> tuple[type[ExperimentError], tuple[tuple[Message, ...]]]:
         return type(self), (self.messages,)
+
+
+def folded(messages: Iterable[Message]) -> Iterator[Message]:
+    """Yield messages, and only the first of many that differ in the line alone.
+
+    >>> for message in folded([Message("a.csv", n, 1, "", "no x") for n in range(2, 7)]):
+    ...     print(message)
+    a.csv:2:1: no x (and so in 4 more lines, to line 6)
+    """
+    alike: dict[tuple[str, str, str], list[Message]] = {}
+    for message in messages:
+        alike.setdefault((message.file, message.path, message.text), []).append(message)
+    for first, *others in alike.values():
+        if len(others) < FEW_ALIKE:
+            yield from (first, *others)
+        else:
+            where = f"(and so in {len(others)} more lines, to line {others[-1].line})"
+            yield replace(first, text=f"{first.text} {where}")
 
 
 def refused(

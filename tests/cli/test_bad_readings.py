@@ -252,6 +252,13 @@ def test_rough_drawings_and_bad_machines_give_no_alarm(
             ["3:17: no x; write a number, or remove the line"],
         ),
         (
+            lambda lines: [lines[0], *(line.rpartition(",")[0] + "," for line in lines[1:])],
+            [
+                "2:64: no z; write a number, or remove the line (and so in 249 more lines, to line"
+                " 251)"
+            ],
+        ),
+        (
             lambda lines: [*lines[:2], lines[2].replace(",", ";"), *lines[3:]],
             ["3:1: 1 columns instead of 6; separate them by commas"],
         ),

@@ -1,1 +1,1 @@
-"""Judgement of a fit: error models, data left out, bootstrap, variance components, budget."""
+"""Judgement of a fit: error models, data left out, budget."""

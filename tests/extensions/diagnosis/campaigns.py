@@ -473,17 +473,19 @@ def main() -> None:
     """Print how often each error is named rightly, wrongly or not at all, over all designs."""
     parser = ArgumentParser()
     parser.add_argument("--sets", type=int, default=8, help="campaigns of each error and design")
-    count = parser.parse_args().sets
+    parser.add_argument("--seed", type=int, default=0, help="the first of the random numbers")
+    arguments = parser.parse_args()
+    count, first = arguments.sets, arguments.seed
     with TemporaryDirectory() as folder:
         designs = [(name, loaded(Path(folder), text)) for name, text in DESIGNS.items()]
-        worlds = [World(one) for _, one in (*designs, *random_designs(Path(folder), 3))]
+        worlds = [World(one) for _, one in (*designs, *random_designs(Path(folder), 3, first))]
     print(
         "| error | right | model | silent | wrong | above twice: right |",
         "|---|---|---|---|---|---|",
         sep="\n",
     )
     for error in ERRORS:
-        found = sum((rates(world, error, count) for world in worlds), Counter[str]())
+        found = sum((rates(world, error, count, first) for world in worlds), Counter[str]())
         cells = [found[word] for word in ("right", "model", "silent", "wrong")]
         large = f"{found['large right']} of {found['large']}"
         print(f"| {error} | {' | '.join(map(str, cells))} | {large} |", flush=True)
