@@ -241,16 +241,21 @@ def _chain(experiment: Experiment, _: Mapping[str, Any]) -> PredictionAssumption
     if arrangement not in EXCHANGED:
         return None
     other = EXCHANGED[arrangement]
-    machine = _section(experiment, "true_machine") or {}
+    machine, source = (
+        _section(experiment, "true_machine") or {},
+        "the random errors of true_machine",
+    )
+    instead = other
     if machine.get("kind") != "random":
         machine = {"kind": "random", "position": "2 um", "rotation": "4 urad", "seed": 1}
+        instead, source = f"{other}, with errors of 2 µm and 4 µrad", "random errors"
     # A model of its own would not have the other chain.
     machine = {key: value for key, value in machine.items() if key != "error_model"}
     return PredictionAssumption(
         "chain",
         f"chain of axes {arrangement}",
-        other,
-        "the random errors of true_machine",
+        instead,
+        source,
         {"error_model": {**model, "arrangement": other}, "true_machine": machine},
         is_systematic=True,
     )

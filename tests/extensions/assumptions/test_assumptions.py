@@ -166,6 +166,13 @@ def test_a_true_machine_of_another_model_takes_the_other_chain_too() -> None:
     assert both[0] == both[1]
 
 
+def test_errors_that_the_file_does_not_state_are_told() -> None:
+    experiments = small_quickstart(), small_quickstart(true_machine={"kind": "zero"})
+    told, assumed = (by_name(bp.assumptions(each))["chain"].assumption for each in experiments)
+    assert told.instead == "MB1" and assumed.instead == "MB1, with errors of 2 µm and 4 µrad"
+    assert assumed.changes["true_machine"]["position"] == "2 um"
+
+
 def test_the_right_chain_has_no_bias() -> None:
     from ballplate.extensions.assumptions.effects import _bias
 
