@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..computing.decompositions import svd
+from ..computing.decompositions import eigvalsh
 from ..design.arrays import Design
 from ..design.observations.distances import CalibratedDistances
 from ..machines.protocol import Array
@@ -30,21 +30,26 @@ def implied_values(design: Design, balls: Array) -> int:
     distances = design.of(CalibratedDistances)
     if not len(distances):
         return 0
+    from scipy.sparse import csr_array
+    from scipy.sparse.linalg import lsmr
     from scipy.special import chdtr
 
     values, slope = distances.values(balls)
     weight = 1.0 / np.maximum(distances.uncertainty, LEAST)
     misfit, artefact = weight * (distances.value - values), design.balls.artefact[distances.first]
+    columns = balls.shape[1] * distances.balls[:, :, None] + np.arange(balls.shape[1])
     count = 0
     for one in np.unique(artefact):
         rows = np.flatnonzero(artefact == one)
-        tied, place = np.unique(distances.balls[rows], return_inverse=True)
-        matrix = np.zeros((len(rows), len(tied), balls.shape[1]))
-        matrix[np.arange(len(rows))[:, None], place.reshape(-1, 2)] = slope[rows]
-        u, sizes, _ = svd(weight[rows, None] * matrix.reshape(len(rows), -1), full_matrices=False)
-        seen = u[:, sizes > UNSEEN * sizes[0]]
-        square = misfit[rows] @ misfit[rows] - ((seen.T @ misfit[rows]) ** 2).sum()
-        others = len(rows) - seen.shape[1]
-        if others and chdtr(others, max(square, 0.0)) < AGREEING:
+        tied, place = np.unique(columns[rows], return_inverse=True)
+        entries = (weight[rows, None, None] * slope[rows]).ravel()
+        ends = np.arange(0, len(entries) + 1, columns[0].size)
+        matrix = csr_array((entries, place.ravel(), ends), shape=(len(rows), len(tied)))
+        # Squares keep eight digits of the ratio of singular values, of which four are needed.
+        squares = eigvalsh((matrix.T @ matrix).toarray())
+        others = len(rows) - int((squares > UNSEEN**2 * squares[-1]).sum())
+        solution = lsmr(matrix, misfit[rows], atol=1e-12, btol=1e-12, conlim=0.0)[0]
+        left = misfit[rows] - matrix @ solution
+        if others and chdtr(others, left @ left) < AGREEING:
             count += others
     return count
