@@ -4,7 +4,7 @@ one column of a table.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from decimal import Decimal
 from pathlib import Path
 from typing import Any
@@ -13,40 +13,24 @@ import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.extensions.laboratory.feature_names import named
-from ballplate.simulator.experiment import lay_out
 from ballplate.simulator.experiment.name_rules import check_rule
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.readings import read_readings
 
 from tests.extensions.laboratory import makers
 from tests.extensions.laboratory.makers import Ball
+from tests.extensions.laboratory.tables import (
+    DESIGN,
+    QUICKSTART,
+    ROWS,
+    assert_all_planned,
+    names_read,
+    of_table,
+)
 
 D = Decimal
-QUICKSTART = bp.quickstart()
-DESIGN = lay_out(QUICKSTART)
 TIPS = {"T1A0B0": "down", "T2A90B0": "left", "T3A90B180": "right", "T4": "front", "T5": "back"}
 TIP_OF = {probe: tip for tip, probe in TIPS.items()}
-ROWS = list(bp.simulate(QUICKSTART, exact=True).itertuples())
-
-
-EXPECTED = {row[1:4]: np.array(row[4:]) / 1000 for row in ROWS}
-
-
-def observed(tmp_path: Path, text: str, name: str = "lab.csv", **readings: object) -> Any:
-    (tmp_path / name).write_text(text, encoding="utf-8")
-    experiment = QUICKSTART.with_readings(readings)
-    design = lay_out(experiment)
-    return read_readings(tmp_path / name, design, settings=experiment.readings)
-
-
-def assert_all_planned(found: Any) -> None:
-    """Every planned reading is there once, at its place but for applied offsets of probes."""
-    assert not found.missing and not found.unplanned
-    assert len(found.x) == len(DESIGN.readings)
-    read = found.design.readings
-    for x, position, ball, probe in zip(found.x, read.position, read.ball, read.probe, strict=True):
-        key = DESIGN.positions.names[position], DESIGN.balls.names[ball], DESIGN.probes.names[probe]
-        np.testing.assert_allclose(x, EXPECTED[key], rtol=0, atol=1e-9)
+SWAPPED = {"left": "right", "right": "left"}
 
 
 def table(name: Callable[[Any], str], more: str = "") -> str:
@@ -57,30 +41,20 @@ def table(name: Callable[[Any], str], more: str = "") -> str:
     return "\n".join([*lines, more, ""])
 
 
-def test_probes_of_tables_have_the_names_of_the_program(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("stated", "tip_of"), [(TIPS, TIP_OF), (SWAPPED, SWAPPED)])
+def test_probes_of_tables_have_the_names_of_the_program(
+    tmp_path: Path, stated: object, tip_of: Mapping[str, str]
+) -> None:
+    """They may be those of other probes."""
     lines = ["position,ball,probe,x_mm,y_mm,z_mm"]
     lines += [
-        f"{row.position},{row.ball},{TIP_OF[row.probe].lower()},{row.x_mm!r},{row.y_mm!r},{row.z_mm!r}"
+        ",".join(map(str, [*row[:2], tip_of.get(row.probe, row.probe).lower(), *row[3:]]))
         for row in ROWS
     ]
-    assert_all_planned(observed(tmp_path, "\n".join(lines), probes=TIPS))
-
-
-def test_names_of_probes_may_be_those_of_other_probes(tmp_path: Path) -> None:
-    swapped = {"left": "right", "right": "left"}
-    lines = ["position,ball,probe,x_mm,y_mm,z_mm"]
-    lines += [
-        f"{row.position},{row.ball},{swapped.get(row.probe, row.probe)},{row.x_mm!r},{row.y_mm!r},{row.z_mm!r}"
-        for row in ROWS
-    ]
-    assert_all_planned(observed(tmp_path, "\n".join(lines), probes=swapped))
-
-
-def test_names_of_probes_in_one_column_may_be_those_of_other_probes(tmp_path: Path) -> None:
-    swapped = {"left": "right", "right": "left"}
-    text = table(lambda row: f"{row.position}/{row.ball}/{swapped.get(row.probe, row.probe)}")
+    assert_all_planned(of_table(tmp_path, "\n".join(lines), probes=stated))
+    text = table(lambda row: f"{row.position}/{row.ball}/{tip_of.get(row.probe, row.probe)}")
     rule = "{position}/{ball}/{probe}"
-    assert_all_planned(observed(tmp_path, text, names=rule, unit="mm", probes=swapped))
+    assert_all_planned(of_table(tmp_path, text, names=rule, unit="mm", probes=stated))
 
 
 def test_columns_of_a_wide_table_have_the_names_of_the_program(tmp_path: Path) -> None:
@@ -91,9 +65,8 @@ def test_columns_of_a_wide_table_have_the_names_of_the_program(tmp_path: Path) -
         own = {TIP_OF[row.probe]: row for row in rows if row.ball == ball}
         cells = [repr(getattr(own[tip], f"{axis}_mm")) for tip in tips for axis in "xyz"]
         lines.append(";".join([ball, *cells]))
-    found = observed(tmp_path, "\n".join(lines), "x low.csv", probes=TIPS)
-    names = [found.design.probes.names[k] for k in found.design.readings.probe]
-    assert sorted(names) == sorted(row.probe for row in rows)
+    found = of_table(tmp_path, "\n".join(lines), "x low.csv", probes=TIPS)
+    assert sorted(names_read(found)) == sorted(row[:3] for row in rows)
 
 
 @pytest.mark.parametrize("form", ["dmis", "pcdmis", "calypso"])
@@ -113,7 +86,7 @@ def test_probes_of_reports_have_the_names_of_the_program(tmp_path: Path, form: s
         pieces = text.split("DIM LOC")
         tips = [f"TIP/{ball.sensor}, SHANKIJK=0, 0, 1\nDIM LOC" for ball in balls]
         text = pieces[0] + "".join(a + b for a, b in zip(tips, pieces[1:], strict=True))
-    assert_all_planned(observed(tmp_path, text, "report.txt", probes=TIPS))
+    assert_all_planned(of_table(tmp_path, text, "report.txt", probes=TIPS), 1e-9)
 
 
 def test_a_probe_that_the_experiment_lacks_is_refused() -> None:
@@ -122,16 +95,15 @@ def test_a_probe_that_the_experiment_lacks_is_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    ("rule", "name"),
+    ("rule", "name", "spelt"),
     [
-        ("SPH_{position}_{ball}_{probe}_*", "SPH_{0}_{1}_{2}_0{3}"),
-        ("*_{position}_{ball}_{probe}", "KUG {3}_{0}_{1}_{2}"),
-        ("SPH({position},{ball},{probe})*", "SPH({0},{1},{2}) {3}"),
-        ("{position}.*.{ball}.{probe}", "{0}.M{3}-x.{1}.{2}"),
-        ("{probe}*{ball}@{position}", "{2} no {3} {1}@{0}"),
+        ("SPH_{position}_{ball}_{probe}_*", "SPH_{0}_{1}_{2}_0{3}", str),
+        ("*_{position}_{ball}_{probe}", "KUG {3}_{0}_{1}_{2}", str.upper),
+        ("SPH({position},{ball},{probe})*", "SPH({0},{1},{2}) {3}", lambda x: x.replace(" ", "_")),
+        ("{position}.*.{ball}.{probe}", "{0}.M{3}-x.{1}.{2}", str.upper),
+        ("{probe}*{ball}@{position}", "{2} no {3} {1}@{0}", str),
     ],
 )
-@pytest.mark.parametrize("spelt", [str, str.upper, lambda text: text.replace(" ", "_")])
 def test_one_column_of_a_table_has_all_names(
     tmp_path: Path, rule: str, name: str, spelt: Callable[[str], str]
 ) -> None:
@@ -140,7 +112,7 @@ def test_one_column_of_a_table_has_all_names(
         lambda row: spelt(name.format(row.position, row.ball, row.probe, next(count))),
         "PLANE_TOP;1;2;3\nORIGIN;0;0;0",
     )
-    found = observed(tmp_path, text, names=rule, unit="mm")
+    found = of_table(tmp_path, text, names=rule, unit="mm")
     assert_all_planned(found)
     assert any(
         f"names are read as {rule}; left out, of another form (2): " in one for one in found.remarks
@@ -151,20 +123,20 @@ def test_the_rule_is_for_what_has_no_names_of_the_experiment(tmp_path: Path) -> 
     lines = ["ball,probe,x_mm,y_mm,z_mm"]
     rows = [row for row in ROWS if row.position == "x low"]
     lines += [f"{row.ball},{row.probe},{row.x_mm!r},{row.y_mm!r},{row.z_mm!r}" for row in rows]
-    found = observed(tmp_path, "\n".join(lines), "x low.csv", names="{position}_{ball}")
-    assert {found.design.positions.names[k] for k in found.design.readings.position} == {"x low"}
+    found = of_table(tmp_path, "\n".join(lines), "x low.csv", names="{position}_{ball}")
+    assert {name for name, *_ in names_read(found)} == {"x low"}
 
 
 def test_a_column_and_a_name_that_contradict_each_other_are_refused(tmp_path: Path) -> None:
     text = "position;ball;x_mm;y_mm;z_mm\nz low;zhigh_r1c1;1;2;3\n"
     with pytest.raises(ExperimentError) as caught:
-        observed(tmp_path, text, names="{position}_{ball}")
+        of_table(tmp_path, text, names="{position}_{ball}")
     assert 'has the position z high, and its column "z low"; state one' in str(caught.value)
 
 
 def test_no_name_of_the_rule_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ExperimentError, match="state the rule with --name"):
-        observed(tmp_path, table(lambda row: f"K{row.ball}"), names="SPH_{ball}", unit="mm")
+        of_table(tmp_path, table(lambda row: f"K{row.ball}"), names="SPH_{ball}", unit="mm")
 
 
 def read(names: list[str], rule: str) -> list[tuple[str, ...] | None]:

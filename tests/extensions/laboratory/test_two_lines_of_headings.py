@@ -8,16 +8,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import ballplate as bp
-import numpy as np
 import pytest
-from ballplate.simulator.experiment import lay_out
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.readings import read_readings
 
-EXPERIMENT = bp.quickstart()
-DESIGN = lay_out(EXPERIMENT)
-ROWS = list(bp.simulate(EXPERIMENT, exact=True).itertuples(index=False))
+from tests.extensions.laboratory.tables import ROWS, assert_all_planned, names_read, of_table
+
 NOMINAL = [[f"{value:.1f}" for value in row[3:]] for row in ROWS]
 NUMBERS = {"position": "1", "ball": "2", "probe": "3", "x": "4", "y": "5", "z": "6"}
 
@@ -26,15 +21,7 @@ def observed(
     tmp_path: Path, lines: Sequence[Sequence[object]], name: str = "lab.csv", **readings: object
 ) -> Any:
     text = "".join(";".join(map(str, line)) + "\n" for line in lines)
-    (tmp_path / name).write_text(text, encoding="utf-8")
-    experiment = EXPERIMENT.with_readings({"unit": "mm", **readings})
-    return read_readings(tmp_path / name, lay_out(experiment), settings=experiment.readings)
-
-
-def assert_all_planned(found: Any) -> None:
-    assert not found.missing and not found.unplanned
-    expected = np.array([row[3:] for row in ROWS]) / 1000
-    np.testing.assert_allclose(found.x, expected, rtol=0, atol=1e-15)
+    return of_table(tmp_path, text, name, **{"unit": "mm", **readings})
 
 
 HEADINGS = {
@@ -56,8 +43,7 @@ def test_a_line_above_states_the_probe(tmp_path: Path) -> None:
     lines = [[*row[:2], *row[3:]] for row in rows]
     head = [["", "", "left", "", ""], ["position", "ball", "X", "Y", "Z"]]
     found = observed(tmp_path, [*head, *lines])
-    assert {DESIGN.probes.names[k] for k in found.design.readings.probe} == {"left"}
-    assert len(found.x) == len(rows)
+    assert names_read(found) == [row[:3] for row in rows]
 
 
 def test_a_title_above_changes_nothing(tmp_path: Path) -> None:
@@ -65,30 +51,17 @@ def test_a_title_above_changes_nothing(tmp_path: Path) -> None:
     assert_all_planned(observed(tmp_path, [*head, *ROWS]))
 
 
-@pytest.mark.parametrize("titles", [0, 1, 2])
-def test_columns_by_number_leave_the_first_reading(tmp_path: Path, titles: int) -> None:
-    lines = [*[["Report"]] * titles, *ROWS]
-    assert_all_planned(observed(tmp_path, lines, columns=NUMBERS))
-
-
-def test_columns_by_number_have_headings_where_there_are_some(tmp_path: Path) -> None:
-    lines = [["Wo", "Was", "Womit", "A", "B", "C"], *ROWS]
-    assert_all_planned(observed(tmp_path, lines, columns=NUMBERS))
+@pytest.mark.parametrize("above", [[], [["Report"]] * 2, [["Wo", "Was", "Womit", "A", "B", "C"]]])
+def test_columns_by_number_leave_the_first_reading(tmp_path: Path, above: list[Any]) -> None:
+    assert_all_planned(observed(tmp_path, [*above, *ROWS], columns=NUMBERS))
 
 
 def test_a_table_without_names_is_matched_by_its_nominal_places(tmp_path: Path) -> None:
-    head = [
-        "position",
-        "probe",
-        *(f"{axis} {kind}" for kind in ("nominal", "actual") for axis in "XYZ"),
-    ]
-    lines = [
-        [row[0], row[2], *nominal, *row[3:]] for row, nominal in zip(ROWS, NOMINAL, strict=True)
-    ]
+    kinds = ("nominal", "actual")
+    head = ["position", "probe", *(f"{axis} {kind}" for kind in kinds for axis in "XYZ")]
+    lines = [[row[0], row[2], *own, *row[3:]] for row, own in zip(ROWS, NOMINAL, strict=True)]
     found = observed(tmp_path, [head, *lines])
     assert_all_planned(found)
-    names = [DESIGN.balls.names[k] for k in found.design.readings.ball]
-    assert names == [row[1] for row in ROWS]
     assert any("balls by nominal co-ordinates" in one for one in found.remarks)
 
 
@@ -97,7 +70,7 @@ def test_nominal_places_may_stand_below_a_line(tmp_path: Path) -> None:
     lines = [[*(f"{value:.1f}" for value in row[3:]), *row[3:]] for row in rows]
     head = [["Soll", "", "", "Ist", "", ""], [*"XYZXYZ"]]
     found = observed(tmp_path, [*head, *lines], "z high.csv")
-    assert [DESIGN.balls.names[k] for k in found.design.readings.ball] == [row[1] for row in rows]
+    assert names_read(found) == [row[:3] for row in rows]
 
 
 def test_a_feature_at_another_place_is_no_ball(tmp_path: Path) -> None:
