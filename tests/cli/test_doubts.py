@@ -104,8 +104,6 @@ volume: [1 m, 1 m, 1 m]
             "EXX: {polynomial: [5 um, 3 um]}",
             "5 µm is subtracted, because errors are zero at the reference point",
         ),
-        ("EXX: {polynomial: [0 um, 3 um]}", ""),
-        ("EAX: {polynomial: [2 urad, 3 urad]}", "2 µrad is subtracted"),
         ("EXZ: {bandwidth: 1 um}", ""),
     ],
 )

@@ -10,12 +10,6 @@ import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.simulator.estimation.functions import MeasuredPoints, displacements
-from ballplate.simulator.estimation.linearisation import linearise
-from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.inputs.quantities import LengthFunction, Target
-from ballplate.uncertainty.pairs import all_pairs
-from ballplate.uncertainty.summaries import uncertainties
 
 TRUTH = re.compile(r"true_machine:\n(  .*\n)+")
 TARGET = re.compile(r"target_uncertainty: .*\n")
@@ -109,26 +103,3 @@ def test_every_estimator_in_the_plane(
     for options in ([], ["--json"]):
         assert main(["fit", str(path), str(readings), "--estimator", estimator, *options]) == 0
         assert "nan" not in capsys.readouterr().out.lower().split()
-
-
-@pytest.mark.parametrize("sigma", [0.0, 1e-320, 1e-200, 0.3, 1.0, 40.0])
-def test_the_share_within_the_target_is_counted_for_any_sigma(sigma: float) -> None:
-    """Against each distance compared by itself."""
-    design = lay_out(bp.quickstart())
-    at = linearise(design)
-    target = Target(LengthFunction(0.5e-6, 1e-6), 2.0)
-    found = uncertainties(at, sigma, target, ("U6",))["U6"]
-    points = design.evaluation.points
-    places = MeasuredPoints(points, np.full(len(points), design.evaluation.probe))
-    covariance = displacements(at, places).common
-    drawn = places.at(design, at.state)
-    first, second = np.triu_indices(len(points), 1)
-    apart = drawn[first] - drawn[second]
-    length = np.linalg.norm(apart, axis=1)
-    unit = apart / length[:, None]
-    each = np.linalg.norm(
-        np.einsum("md,mdr->mr", unit, covariance[first] - covariance[second]), axis=1
-    )
-    within = 2.0 * sigma * each <= 0.5e-6 + 1e-6 * length
-    assert found.within_target == pytest.approx(within.mean(), abs=1.5 / len(within))
-    assert all_pairs(displacements(at, places), places.labels).within == 0

@@ -1,7 +1,6 @@
 """The wording that the tests of cli expect: a rewording is entered here alone."""
 
 ALPHA_DEPARTURE_OF_THE_AXES = "alpha (departure of the axes from squareness)"
-AN_ANGLE_IS_EXPECTED = "an angle is expected"
 AN_ELEVATION_IS_OUTSIDE_DEG = (
     "11:57: artefacts.high.directions: an elevation is outside -90 deg to 90 deg; give "
     "one of that range"
@@ -44,7 +43,6 @@ CORRECT_OR_REMOVE = "correct or remove it"
 CORRECT_THE_NAMES_OF_THE_BALLS = "correct the names of the balls"
 DATA_SETS_OF = "data sets of 6.2.7[5 x 5]"
 DID_YOU_MEAN = 'did you mean "position"?'
-DID_YOU_MEAN_2 = 'did you mean "down"?'
 DID_YOU_MEAN_3 = '--trails=5; did you mean "--trials"?'
 DIRECTIONS_ARE_TOO_MANY = (
     "12:57: artefacts.many.directions: 5040 directions are too many; at most 5000 are possible"
@@ -56,7 +54,6 @@ ESTIMATORS_OF_DISTANCES_ALONE_CANNOT_FOLLOW = (
 ESTIMATOR_DISTANCES_LENGTHS_OF_STANDARDS_AGAINST = (
     "estimator distances (12 lengths of standards) against"
 )
-EXX_POSITIONING_ERROR = "EXX (positioning error of X, quadratic)"
 FAR_OUTSIDE_THE_VOLUME = "far outside the volume; check the unit"
 FINISHED_CELLS_ARE_IN_NEW_SQLITE = "finished cases are in new.sqlite"
 FITS_THE_PROBE_LEFT = "fits the probe left, not right; correct the name of the probe"
@@ -68,7 +65,6 @@ HAS_NO_BALL_BAR_OR_BRYAN_GAUGE = "has no ball bar or Bryan gauge"
 HAS_NO_UNIT = (
     '6:37: artefacts.unit.radius: "300" has no unit; write for example "300 mm" or "300 um"'
 )
-HAS_NO_UNIT_2 = 'machine.repeatability: "0.2" has no unit; '
 INTERRUPTED_FINISHED_CELLS = "interrupted; finished cases are in"
 IN_POSITION_TURNED = "in position turned, line 9; correct or"
 IS_A_BRYAN_GAUGE_AND_HAS = (
@@ -90,8 +86,6 @@ MODULES_ARE_NOT_ALLOWED_HERE_LEAVE = "modules are not allowed here; leave --no-m
 MONOMIALS_APPLIES_TO_ESTIMATOR_FULL = (
     "--monomials applies to --estimator full, distances, cresto or kruth only; leave it out"
 )
-MONTE_CARLO_DATA_SETS = "Monte Carlo: 10 data sets of the true machine"
-NO_READING_OF_THE_BALLS = 'no reading of the balls "r1c2", "r1c3"'
 OF_THE_STATED_ONES = "of the stated ones"
 ONLY_A_BRYAN_GAUGE_HAS = (
     '22:12: calibration[1].kind: only a Bryan gauge has a radius, and "bar" is not one; '
@@ -111,14 +105,12 @@ PRIORS_REFER_TO_THE_FILES_ERROR = (
 RADIUS_CHANGE_TOGETHER_WITHOUT_CHANGING_ANY = (
     "gauge: radius (0.3 µm): change together without changing any observation"
 )
-RANK_DEFICIENCY_EXPECTED_FULL_RANK = "rank deficiency 2, expected full rank"
 READING_BALL_WITH_PROBE_PUTS = (
     '18:5: positions[0]: reading ball "2" with probe "magnet" moves the scales to y = 900 mm,'
     " 100 mm above the measuring volume, and 1 more reading; move the artefact, or read it"
     " otherwise"
 )
 READ_BUT_NOT_PLANNED_LOW = "read but not planned (1): z low: ball r1c2 with right"
-STANDARD_OUTPUT_CANNOT_BE_WRITTEN = "standard output: cannot be written"
 STANDARD_OUTPUT_CANNOT_BE_WRITTEN_NO_SPACE = (
     "standard output: cannot be written (No space left on device); give it room"
 )
@@ -146,7 +138,6 @@ THE_SCALE_RESTS_ON_PROBE_OFFSETS = "warning: the scale rests on probe offsets"
 THREE_PARAMETERS_NO_OFFSETS = (
     "three parameters, no offsets, scale difference: none (fitted, but not applied)"
 )
-TRUE_MACHINE_VALUES_EXX_THE_ERROR = "true_machine.values[EXX t^9]: the error model has no parameter"
 UNKNOWN_PARAMETER_DID_YOU_MEAN = (
     '28:17: priors[0].parameter: unknown parameter "a: rotation z"; did you mean "a: origin z"?'
 )
