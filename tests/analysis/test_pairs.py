@@ -71,7 +71,7 @@ MANY = {
 }
 
 
-@pytest.mark.parametrize("sigma", [0.0, 1e-320, 1.5, 4.0])
+@pytest.mark.parametrize("sigma", [0.0, 1e-320, 1.5])
 @pytest.mark.parametrize("moved", MANY.values(), ids=MANY)
 def test_all_pairs_are_each_by_itself(moved: Displacements, sigma: float) -> None:
     every, lengths, values = one_by_one(moved)

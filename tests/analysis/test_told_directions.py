@@ -165,21 +165,3 @@ def test_of_many_parts_the_first_are_told_and_the_others_counted(count: int) -> 
     ]
     assert re.findall(r"and (\d+) more", moved) == [str(count - 6)] * (count > 6)
     assert words.endswith(wording.CHANGE_TOGETHER_WITHOUT_CHANGING_ANY_OBSERVATION)
-
-
-@pytest.mark.parametrize(
-    ("shift", "turn", "words"),
-    [
-        (2e-6, 0.0, "(2 µm along x)"),
-        (0.0, 3e-6, "(3 µrad about z)"),
-        (2e-6, 3e-6, "(2 µm along x, 3 µrad about z)"),
-        (0.9e-12, 3e-6, "(3 µrad about z)"),
-        (2e-6, 0.9e-12, "(2 µm along x)"),
-        (1.1e-12, 1.1e-12, "(1.1e-06 µm along x, 1.1e-06 µrad about z)"),
-    ],
-)
-def test_a_position_shifts_and_turns(shift: float, turn: float, words: str) -> None:
-    part = PositionPart("a", shift, turn, " along x", " about z")
-    assert in_words(Direction((), (), (part,))) == f"moved positions: a {words}: " + (
-        "changes no observation"
-    )

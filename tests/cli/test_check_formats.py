@@ -265,18 +265,18 @@ def shell(script: str, folder: Path, **variables: str) -> subprocess.CompletedPr
 
 def a_repository(top: Path) -> None:
     """Designs in folders, one of them with a blank in its name, beside YAML files that are none."""
-    text = QUICKSTART.read_text(encoding="utf-8")
-    for name in ("designs/one.yaml", "designs/more/of them.yaml"):
-        path = top / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
-    (top / "settings.yaml").write_text("colour: blue\n", encoding="utf-8")
-    (top / "designs/sweeps").mkdir()
-    (top / "designs/sweeps/size.yaml").write_text("base: ../one.yaml\n", encoding="utf-8")
-    (top / "designs/machines").mkdir()
-    (top / "designs/machines/bridge.yaml").write_text("arrangement: MB1\n", encoding="utf-8")
-    (top / "designs/old/sweeps").mkdir(parents=True)
-    (top / "designs/old/sweeps/size.yaml").write_text("base: ../one.yaml\n", encoding="utf-8")
+    texts = dict.fromkeys(
+        ("designs/one.yaml", "designs/more/of them.yaml"), QUICKSTART.read_text(encoding="utf-8")
+    )
+    texts |= {
+        "settings.yaml": "colour: blue\n",
+        "designs/machines/bridge.yaml": "arrangement: MB1\n",
+    }
+    for name in ("designs/sweeps/size.yaml", "designs/old/sweeps/size.yaml"):
+        texts[name] = "base: ../one.yaml\n"
+    for name, text in texts.items():
+        (top / name).parent.mkdir(parents=True, exist_ok=True)
+        (top / name).write_text(text, encoding="utf-8")
 
 
 def test_the_action_checks(tmp_path: Path) -> None:

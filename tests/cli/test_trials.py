@@ -7,14 +7,11 @@ import os
 import signal
 import subprocess
 import sys
-import threading
-from argparse import Namespace
 from pathlib import Path
 
 import ballplate as bp
 import pytest
 from ballplate.cli import main
-from ballplate.cli.progress_bars import progress
 from ballplate.simulator.computing.steps import ProgressStep
 
 from tests.cli import wording
@@ -122,43 +119,6 @@ def test_an_interruption_reports_what_is_done(tmp_path: Path) -> None:
     found = json.loads(out)["monte_carlo"]
     assert found["interrupted"] and found["trials"] >= 512
     assert wording.THE_RESULTS_ARE_THOSE in err and "Traceback" not in err
-
-
-class Terminal:
-    """Standard error as a terminal of some width."""
-
-    encoding = "ascii"
-
-    def __init__(self) -> None:
-        self.text = ""
-
-    def write(self, text: str) -> None:
-        self.text += text
-
-    def flush(self) -> None:
-        pass
-
-    def isatty(self) -> bool:
-        return True
-
-    @property
-    def lines(self) -> list[str]:
-        """What has stood in the line, one after the other."""
-        return self.text.split("\r")[1:]
-
-
-def test_each_step_has_a_bar_of_its_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    terminal = Terminal()
-    monkeypatch.setattr(sys, "stderr", terminal)
-    monkeypatch.setenv("COLUMNS", "80")
-    threads = threading.active_count()
-    with progress(Namespace(quiet=False, verbose=False)) as shown:
-        shown.show(ProgressStep("candidates", 0, 3))
-        shown.show(ProgressStep("starts of the search", 0, 25))
-        assert threading.active_count() == threads
-    told = [line.strip() for line in terminal.lines if line.strip()]
-    assert "candidates" in told[0] and "0/3" in told[0]
-    assert "starts of the search" in told[-1] and "0/25" in told[-1]
 
 
 def test_every_step_of_a_plan_tells_how_much_there_is(tmp_path: Path) -> None:
