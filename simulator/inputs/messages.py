@@ -45,7 +45,7 @@ class Message:
 
 
 class ExperimentError(Exception):
-    """An experiment file cannot be used; ``messages`` has all reasons in the order of lines, and its
+    """An experiment file cannot be used; ``messages`` has all reasons in the order of lines, its
     text the first of those that are alike.
     """
 

@@ -6,18 +6,13 @@ import io
 import math
 
 import ballplate as bp
-import numpy as np
 import pandas
 from ballplate.results import planned_uncertainty
-from ballplate.simulator.estimation import linearise
-from ballplate.simulator.estimation.functions import displacements
-from ballplate.uncertainty import pairs_of
-from ballplate.uncertainty.kernel_quantities import evaluation_points
 
 # The first three points are in a plane that two of the positions determine, the last is not.
 POINTS = [[250, 250, 300], [500, 250, 300], [750, 750, 300], [900, 100, 900]]
-# Positions that are read: three that leave something undetermined, and three that do not.
-PART, WHOLE = (0, 1, 2), (0, 2, 4)
+# Positions that are read, which leave something undetermined.
+PART = (0, 1, 2)
 
 
 def sections(read: tuple[int, ...]) -> dict[str, object]:
@@ -28,16 +23,6 @@ def sections(read: tuple[int, ...]) -> dict[str, object]:
 
 def design(read: tuple[int, ...]) -> bp.Experiment:
     return bp.quickstart().with_(sections(read))
-
-
-def test_the_part_would_flatter() -> None:
-    """What is determined has a smaller average than all distances of the complete design."""
-    at = linearise(bp.lay_out(design(PART)))
-    pairs = np.stack(np.triu_indices(len(POINTS), 1), axis=1)
-    tile = pairs_of(displacements(at, evaluation_points(at.design)), pairs)
-    determined = tile.uncertainties[~tile.is_open]
-    assert 0 < len(determined) < len(pairs)
-    assert determined.mean() < bp.run(design(WHOLE))["U6"].average
 
 
 def test_numbers_of_a_deficient_design() -> None:

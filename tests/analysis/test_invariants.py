@@ -4,7 +4,6 @@ repeated estimates.
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +14,6 @@ from ballplate.simulator.design.observations.distances import CalibratedDistance
 from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.geometry.motions import rotation_from_vector
-from ballplate.simulator.inputs.quantities import LengthFunction, Target
 from ballplate.uncertainty.summaries import Quantity, uncertainties
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -148,16 +146,6 @@ def test_u_scales_with_sigma(factor: float, calibration: str) -> None:
         assert by_estimate[symbol].maximum == pytest.approx(factor * quantity.maximum, rel=1e-12)
 
 
-@pytest.mark.parametrize("size", [1, 5])
-def test_tiles_do_not_matter(monkeypatch: pytest.MonkeyPatch, size: int) -> None:
-    expected, _, _ = judged(small_design(4))
-    monkeypatch.setattr("ballplate.uncertainty.pairs.TILE", size)
-    found, _, _ = judged(small_design(4))
-    for symbol in ("U5", "U6"):
-        assert_same(found[symbol], expected[symbol])
-        assert found[symbol].largest == expected[symbol].largest
-
-
 @pytest.mark.parametrize("rows", [10, 64])
 def test_batches_do_not_matter(monkeypatch: pytest.MonkeyPatch, rows: int) -> None:
     expected, _, _ = judged(small_design(4, "neighbours"))
@@ -165,27 +153,3 @@ def test_batches_do_not_matter(monkeypatch: pytest.MonkeyPatch, rows: int) -> No
     found, _, _ = judged(small_design(4, "neighbours"))
     for symbol, quantity in expected.items():
         assert_same(found[symbol], quantity)
-
-
-def test_share_of_distances_within_the_target() -> None:
-    """Against a count over single pairs."""
-    design = small_design(7)
-    at = linearise(design)
-    values = []
-    for i, j in itertools.combinations(range(len(design.evaluation.points)), 2):
-        pair = altered(design, evaluation={"points": design.evaluation.points[[i, j]]})
-        length = float(np.linalg.norm(design.evaluation.points[i] - design.evaluation.points[j]))
-        values.append((uncertainties(replace(at, design=pair))["U6"].maximum, length))
-    cases = (
-        (2e-7, 0.0, 1.0, 1.0),
-        (1e-7, 2e-7, 1.0, 1.0),
-        (1e-7, 2e-7, 1.7, 1.0),
-        (3e-7, 4e-7, 1.2, 2.0),
-    )
-    for constant, slope, sigma, k in cases:
-        target = Target(LengthFunction(constant, slope), k)
-        found = uncertainties(at, sigma, target)["U6"].within_target
-        assert found == np.mean(
-            [k * sigma * u <= constant + slope * length for u, length in values]
-        )
-        assert found is not None and 0 < found < 1

@@ -20,9 +20,8 @@ from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.axes import PlateAxes
 from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.machines.truth import true_machine
-from ballplate.simulator.readings.generate import noisy_readings, on_true_machine
 from ballplate.simulator.readings.observed_readings import ObservedReadings
+from ballplate.simulator.readings.simulated import simulated_readings
 from numpy.typing import NDArray
 
 ANGLES = Path("designs/hocken_borchardt/angles.yaml")
@@ -42,13 +41,8 @@ def experiment(tmp_path: Path, variant: str = "three positions", **changes: obje
 
 
 def observed(drawn: Experiment, seed: int) -> ObservedReadings:
-    design = lay_out(drawn)
-    corners = design.machine.volume.corners
-    on_truth, truth = on_true_machine(
-        design, true_machine(drawn.true_machine, design.model, *corners)
-    )
-    readings, x = noisy_readings(on_truth, truth, np.random.default_rng(seed))
-    return ObservedReadings(replace(design, readings=readings), x, (), ())
+    given = simulated_readings(drawn, seed)
+    return ObservedReadings(replace(given.design, readings=given.readings), given.x, (), ())
 
 
 def dense_uncertainties(design: Design, x: Array, found: Fit, axes: PlateAxes) -> Array:

@@ -181,18 +181,6 @@ def output(
     return FACES[face](path, capsys)
 
 
-def test_the_examples_have_one_qualification(files: Any, tmp_path: Path) -> None:
-    for kind in (None, *WORDS):
-        text, made = files(kind)
-        path = made / "one.yaml"
-        path.write_text(text, encoding="utf-8")
-        kinds = {one.kind for one in bp.check(path).qualifications}
-        expected = {None: set(), "reach": set()}.get(kind, {kind})
-        assert expected <= kinds <= expected | {"assumption"}, (kind, kinds)
-        if kind in (None, "reach", "assumption", "undetermined"):
-            assert kinds == expected
-
-
 @pytest.mark.parametrize("face", FACES)
 def test_without_qualifications(
     face: str, files: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]

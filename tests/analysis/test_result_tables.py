@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
 from html.parser import HTMLParser
 from typing import Any
 
@@ -14,10 +12,10 @@ import numpy as np
 import pandas as pd
 import pytest
 from ballplate.presentation.result import Result
-from ballplate.presentation.table_columns import Columns, by_axis, table_lines, table_rows
 from ballplate.results.fits import Fit
 from ballplate.results.prediction import Prediction
 
+from tests.reference.small_quickstart import small_quickstart
 from tests.reference.tables import read_table
 
 PLACES = {
@@ -65,7 +63,7 @@ def from_markdown(text: str) -> list[list[str]]:
 
 @pytest.fixture(scope="module")
 def results() -> list[Result]:
-    experiment = bp.quickstart()
+    experiment = small_quickstart()
     deficient = experiment.with_(
         {f"positions[{name}]": None for name in ("x low", "x high", "y low")}
     )
@@ -167,75 +165,3 @@ def test_quantities_and_parameters_are_found_by_their_names(results: list[Result
     for result, name, hint in ((prediction, "U7", "U1"), (fit, "EXX[11]", "EXX[1]")):
         with pytest.raises(KeyError, match=re.escape(hint)):
             result[name]
-
-
-@dataclass(frozen=True)
-class Rod:
-    name: str
-    length: float
-    u: float
-    is_met: bool | None
-    unit: str = "m"
-
-
-class Rods(Result):
-    """A result that states its columns alone."""
-
-    label, title = "rods", "two rods"
-    rods = (Rod("a", 0.5, 1e-6, True), Rod("b", float("nan"), float("nan"), None))
-
-    def headline(self) -> str:
-        return "two rods"
-
-    def columns(self) -> tuple[Columns, Sequence[Any]]:
-        return RODS, self.rods
-
-
-RODS: dict[str, Any] = {
-    "rod": "name",
-    "length, mm": ("length", "u"),
-    "u": ("u", 3),
-    "share": (lambda rod: 1e6 * rod.u, "{:.1f}".format),
-    "met": "is_met",
-    "unit": "unit",
-}
-
-
-def test_columns_stated_once_give_every_form() -> None:
-    """Values in metres, and in the units of headings and of the column "unit"."""
-    found = Rods()
-    assert table_lines(
-        {name: RODS[name] for name in ("rod", "length, mm", "u", "unit")}, found.rods
-    ) == [
-        "rod  length, mm     u  unit",
-        "a     500.00000  1.00  µm",
-        "b             -     -  µm",
-    ]
-    assert table_lines(RODS, found.rods, "unit", "open")[1:] == [
-        "a     500.00000  1.00    1.0  yes",
-        "b          open  open    nan",
-    ]
-    row, _ = found.rows()
-    assert row == {"rod": "a", "length": 0.5, "u": 1e-6, "share": 1.0, "met": True, "unit": "m"}
-    frame = found.to_frame()
-    assert list(frame) == ["rod", "length, mm", "u", "share", "met", "unit"]
-    assert frame["length, mm"][0] == 500.0 and frame["u"][0] == 1.0 and frame["unit"][0] == "µm"
-    assert found.to_csv().splitlines()[:2] == [
-        "rod,length,u,share,met,unit",
-        "a,0.5,1e-06,1.0,True,m",
-    ]
-    assert from_markdown(found.to_markdown())[0] == list(frame)
-
-
-def test_columns_with_the_same_heading_and_parts_of_items() -> None:
-    items = [{"at": Rod("a", 1e-16, 1e-17, False)}, {"at": None}]
-    columns = [
-        ("", "at.name"),
-        ("", lambda item: 3),
-        ("µm", ("at.length", 3)),
-        ("met", "at.is_met"),
-    ]
-    assert table_lines(columns, items) == ["      µm  met", "a  3   0  no", "   3"]
-    by = by_axis("{} of it, µm", np.array([[1e-6, 2e-6]]), np.array([[1e-7, 1e-6]]))
-    assert table_lines(by) == ["x of it, µm  y of it, µm", "      1.000         2.00"]
-    assert table_rows(by) == [{"x of it": 1e-6, "y of it": 2e-6}]

@@ -120,33 +120,6 @@ def test_offsets_with_an_uncertainty_are_what_generalised_least_squares_makes_of
         assert found.maximum == pytest.approx(lengths.max(), rel=1e-6)
 
 
-def test_scale_is_the_mean_relative_change_of_distances(tmp_path: Path) -> None:
-    """Counted pair by pair, for a change of the machine's parameters."""
-    design = lay_out(experiment_of(tmp_path, SMALL))
-    at = linearise(design)
-    layout, state, row = at.layout, at.state, scale_row(at)
-    step = 1e-6 * np.random.default_rng(3).normal(size=len(state.a))
-    points = design.evaluation.points
-    offsets = np.broadcast_to(design.probes.offsets[design.evaluation.probe], points.shape)
-    moved = points + design.model.error(points, step, offsets)
-    pairs = list(itertools.combinations(range(len(points)), 2))
-    changes = [
-        np.linalg.norm(moved[i] - moved[j]) / np.linalg.norm(points[i] - points[j]) - 1
-        for i, j in pairs
-    ]
-    weights = [np.sum((points[i] - points[j]) ** 2) for i, j in pairs]
-    assert row[layout.model] @ step == pytest.approx(np.average(changes, weights=weights), rel=1e-3)
-
-
-def test_the_readings_alone_never_tell_the_scale(tmp_path: Path) -> None:
-    """Certificates or exact offsets are needed, and one of them is enough."""
-    certified, bare = experiment_of(tmp_path, SMALL), experiment_of(tmp_path, without_certificate())
-    unknown = np.inf
-    assert scale_uncertainty(with_offsets(bare, unknown)) == np.inf
-    assert np.isfinite(scale_uncertainty(with_offsets(certified, unknown)))
-    assert np.isfinite(scale_uncertainty(bare))
-
-
 def test_a_design_without_a_certificate_is_told_where_its_scale_comes_from(tmp_path: Path) -> None:
     found = check(experiment_of(tmp_path, without_certificate()))
     assert found.verdict.deficiency == 0 and found.scale is not None

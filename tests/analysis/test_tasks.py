@@ -10,16 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.results.checked_designs import predict
-from ballplate.simulator.design.arrays import Design, State, nominal_state
 from ballplate.simulator.design.observations.distances import CalibratedDistances
-from ballplate.simulator.design.parameters import SharedLayout, shared_layout
-from ballplate.simulator.estimation.functions import linear_functions
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.quantities import Target
-from ballplate.uncertainty.kernel_quantities import task_distances
 from ballplate.uncertainty.summaries import uncertainties
 
 from tests.analysis.test_invariants import judged, small_design
@@ -73,51 +69,6 @@ def test_tasks_are_judged_by_their_own_target_or_that_of_the_file(tmp_path: Path
     lines = planned.lines()
     assert any(line.startswith("bore distance") and line.endswith("no") for line in lines)
     assert len(planned.design.evaluation.points) == 200
-
-
-def length_of(ends: np.ndarray) -> np.ndarray:
-    """Lengths (t,) between the ends (2 t, 3) of tasks."""
-    return np.linalg.norm(ends[::2] - ends[1::2], axis=1)
-
-
-def changed(design: Design, layout: SharedLayout, state: State, step: np.ndarray) -> State:
-    """The state with the machine's parameters and estimated offsets changed by a step (s,)."""
-    offsets = state.probes.copy()
-    free = layout.offset_columns >= 0
-    offsets[free] += step[layout.offset_columns[free]]
-    return replace(state, a=state.a + step[layout.model], probes=offsets)
-
-
-def test_rows_are_derivatives_with_estimated_probe_offsets(tmp_path: Path) -> None:
-    free = QUICKSTART.replace(
-        "right: [50 mm, 0 mm, 0 mm]", "right: {offset: [50 mm, 0 mm, 0 mm], unknown: true}"
-    )
-    free = free.replace(
-        "front: [0 mm, -50 mm, 0 mm]", "front: {offset: [0 mm, -50 mm, 0 mm], unknown: true}"
-    )
-    design = lay_out(with_tasks(tmp_path, text=free))
-    layout = shared_layout(design)
-    state = replace(
-        nominal_state(design),
-        a=np.random.default_rng(3).normal(0, 1e-5, len(design.model.parameters)),
-    )
-    given = task_distances(design)
-    rows = linear_functions(linearise(design, state), given).shared
-    assert rows.shape == (3, len(layout))
-    # The fixed tip has no part in it, a tip of one end all, a tip of both only what rotations make
-    # of it.
-    by_offset = np.abs(rows[:, layout.offsets]).max(axis=1)
-    assert by_offset[0] == 0.0 and by_offset[1] > 0.9 and 0.0 < by_offset[2] < 1e-3
-    generator = np.random.default_rng(4)
-    for _ in range(4):
-        step = 1e-5 * generator.standard_normal(len(layout))
-        lengths = [
-            length_of(given.places.at(design, changed(design, layout, state, sign * step)))
-            for sign in (1, -1)
-        ]
-        np.testing.assert_allclose(
-            rows @ step, (lengths[0] - lengths[1]) / 2.0, atol=1e-14, rtol=1e-6
-        )
 
 
 def test_undetermined_tasks_are_told_as_such() -> None:

@@ -152,15 +152,6 @@ def test_what_moves_points_by_a_hundredth_of_the_largest_is_told(seed: int) -> N
     )
 
 
-def test_the_directions_at_random_have_parts_of_all_kinds_that_are_told_and_that_are_not() -> None:
-    told = [null_directions(at_random(seed)[0])[0] for seed in range(12)]
-    for name, most in (
-        ("functions", 6), ("positions", 4), ("artefacts", 1), ("probes", 1), ("lengths", 1)
-    ):  # fmt: skip
-        counts = {len(getattr(one, name)) for one in told}
-        assert min(counts) < most and max(counts) > 0, (name, counts)
-
-
 @pytest.mark.parametrize("count", [1, 6, 7, 8, 9, 14])
 def test_of_many_parts_the_first_are_told_and_the_others_counted(count: int) -> None:
     functions = tuple(FunctionPart(f"F{k}", "meaning", 1e-6, "m", "") for k in range(count))
@@ -174,21 +165,3 @@ def test_of_many_parts_the_first_are_told_and_the_others_counted(count: int) -> 
     ]
     assert re.findall(r"and (\d+) more", moved) == [str(count - 6)] * (count > 6)
     assert words.endswith(wording.CHANGE_TOGETHER_WITHOUT_CHANGING_ANY_OBSERVATION)
-
-
-@pytest.mark.parametrize(
-    ("shift", "turn", "words"),
-    [
-        (2e-6, 0.0, "(2 µm along x)"),
-        (0.0, 3e-6, "(3 µrad about z)"),
-        (2e-6, 3e-6, "(2 µm along x, 3 µrad about z)"),
-        (0.9e-12, 3e-6, "(3 µrad about z)"),
-        (2e-6, 0.9e-12, "(2 µm along x)"),
-        (1.1e-12, 1.1e-12, "(1.1e-06 µm along x, 1.1e-06 µrad about z)"),
-    ],
-)
-def test_a_position_shifts_and_turns(shift: float, turn: float, words: str) -> None:
-    part = PositionPart("a", shift, turn, " along x", " about z")
-    assert in_words(Direction((), (), (part,))) == f"moved positions: a {words}: " + (
-        "changes no observation"
-    )

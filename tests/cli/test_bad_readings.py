@@ -7,11 +7,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.cli import main
 
 from tests.cli import wording
+from tests.reference.small_quickstart import small_sections
 
 QUICKSTART = "designs/quickstart.yaml"
 Lines = list[str]
@@ -71,7 +73,7 @@ def test_all_mistakes_are_named_at_once(
     assert wording.IS_MM_FROM_WHERE_IT_SHOULD in found[4] and "y +10 mm" in found[4]
 
 
-@pytest.mark.parametrize("amount", [5.0, 20.0, 300.0])
+@pytest.mark.parametrize("amount", [5.0, 300.0])
 def test_one_wrong_reading(
     good: Lines, tmp_path: Path, capsys: pytest.CaptureFixture[str], amount: float
 ) -> None:
@@ -82,9 +84,7 @@ def test_one_wrong_reading(
     )
 
 
-@pytest.mark.parametrize(
-    ("quarters", "words"), [(3, "by 90 degrees"), (2, "by 180 degrees"), (1, "by 270 degrees")]
-)
+@pytest.mark.parametrize(("quarters", "words"), [(3, "by 90"), (1, "by 270")])
 def test_a_position_read_in_a_turned_order(
     good: Lines, tmp_path: Path, capsys: pytest.CaptureFixture[str], quarters: int, words: str
 ) -> None:
@@ -96,7 +96,8 @@ def test_a_position_read_in_a_turned_order(
     ]
     (line,) = refusals(lines, tmp_path, capsys)
     assert (
-        f": position x high: the readings fit the plate turned {words}; correct the names" in line
+        f": position x high: the readings fit the plate turned {words} degrees; correct the names"
+        in line
     )
 
 
@@ -173,64 +174,39 @@ def test_two_readings_that_disagree(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert line.startswith(wording.BALL_IN_POSITION_FIRST) and wording.IN_POSITION_TURNED in line
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_rough_drawings_and_bad_machines_give_no_alarm(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], seed: int
-) -> None:
+@pytest.mark.parametrize("seed", [0, 2])
+def test_rough_drawings_and_bad_machines_give_no_alarm(seed: int) -> None:
     """Balls up to a tenth of their distance from where they are drawn, a machine a hundred times
     worse than usual.
     """
     generator = np.random.default_rng(seed)
     places = np.array([(187.5 * i, 187.5 * j) for j in range(5) for i in range(5)])
     drawn = places + generator.uniform(-18.75, 18.75, places.shape)
-    text = Path(QUICKSTART).read_text(encoding="utf-8")
-    text = text.replace("position: 2 um", "position: 200 um").replace(
-        "rotation: 4 urad", "rotation: 400 urad"
-    )
-    text = text.partition("calibration:")[0] + "seed: 5\n"
+    machine = {"kind": "random", "position": "200 um", "rotation": "400 urad", "seed": 7}
+    sections = small_sections(kept=True, true_machine=machine, calibration=[])
+    sections["machine"]["volume"] = {axis: ["-100 mm", "1.1 m"] for axis in "xyz"}
+    sections.pop("expected_rank_deficiency")
 
-    def listed(balls: np.ndarray) -> str:
-        return (
-            "{kind: balls, coordinates: [" + ", ".join(f"[{x} mm, {y} mm]" for x, y in balls) + "]}"
-        )
+    def of(balls: np.ndarray) -> bp.Experiment:
+        listed = [[f"{x} mm", f"{y} mm"] for x, y in balls]
+        plate = {"kind": "balls", "coordinates": listed}
+        return bp.experiment(sections | {"artefacts": {"plate": plate}})
 
-    grid = "{kind: grid, balls: [5, 5], size: [750 mm, 750 mm]}"
-    assert grid in text
-    text = text.replace(
-        "volume: [1 m, 1 m, 1 m]",
-        "volume: {x: [-100 mm, 1.1 m], y: [-100 mm, 1.1 m], z: [-100 mm, 1.1 m]}",
-    )
-    design, readings = tmp_path / "rough.yaml", tmp_path / "r.csv"
-    design.write_text(text.replace(grid, listed(places)), encoding="utf-8")
-    assert main(["simulate", str(design), "-o", str(readings)]) == 0
-    if seed > 1:
+    readings = bp.simulate(of(places))
+    if seed:
         # Not all balls in all positions.
-        header, *rows = readings.read_text(encoding="utf-8").splitlines()
-        keep = generator.random(len(rows)) < 0.6
+        keep = generator.random(len(readings)) < 0.6
         keep[:25] = True
-        readings.write_text("\n".join([header, *np.array(rows)[keep]]) + "\n", encoding="utf-8")
-    design.write_text(text.replace(grid, listed(drawn)), encoding="utf-8")
-    assert main(["fit", "--json", str(design), str(readings)]) in (0, 1), capsys.readouterr().err
+        readings = readings[keep]
+    assert bp.fit(of(drawn), readings).converged
 
 
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
         (
-            lambda lines: [],
-            ["1:1: the file is empty; its first line should be position,ball,probe,x_mm,y_mm,z_mm"],
-        ),
-        (
-            lambda lines: lines[:1],
-            ["1:1: no rows below the names of the columns; add at least one"],
-        ),
-        (
             lambda lines: [line.rpartition(",")[0] for line in lines],
             ["1:1: no column for z; the first line should be position,ball,probe,x_mm,y_mm,z_mm"],
-        ),
-        (
-            lambda lines: [lines[0].replace("z_mm", "z_mmm"), *lines[1:]],
-            ['1:31: unknown unit in the column "z_mmm"; did you mean "mm"?'],
         ),
         (
             lambda lines: with_cell(lines, 3, 3, lambda x: "187,5"),
@@ -238,18 +214,6 @@ def test_rough_drawings_and_bad_machines_give_no_alarm(
                 "3:1: 7 columns instead of 6; if a comma is meant as the decimal point, write a"
                 " point, as in 187.5"
             ],
-        ),
-        (
-            lambda lines: with_cell(lines, 3, 3, lambda x: '"187,5"'),
-            ['3:17: "187,5" has a decimal comma; write 187.5'],
-        ),
-        (
-            lambda lines: with_cell(lines, 3, 3, lambda x: "nan"),
-            ['3:17: "nan" is not a number; write for example "500.0003"'],
-        ),
-        (
-            lambda lines: with_cell(lines, 3, 3, lambda x: ""),
-            ["3:17: no x; write a number, or remove the line"],
         ),
         (
             lambda lines: [lines[0], *(line.rpartition(",")[0] + "," for line in lines[1:])],

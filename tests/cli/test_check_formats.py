@@ -18,7 +18,7 @@ from ballplate.extensions.ci.github import annotation_lines, in_message, in_prop
 from ballplate.extensions.ci.junit import junit_report
 from ballplate.extensions.repair.repair_search import repairs
 from ballplate.extensions.repair.repairs import Repairs
-from ballplate.planning.checked_files import CheckedFile, check_files
+from ballplate.planning.checked_files import CheckedFile
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import Message
 
@@ -88,66 +88,44 @@ def test_an_unknown_variant_is_an_error_in_every_format(
 
 
 def test_workflow_commands(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert (
-        run("check", "--format", "github", "good.yaml", "wrong.yaml", "broken.yaml", "missing.yaml")
-        == 3
-    )
+    names = ["good.yaml", "wrong.yaml", "broken.yaml", "missing.yaml", "silent.yaml"]
+    assert run("check", "--format", "github", *names) == 3
     out, err = capsys.readouterr()
     assert err == ""
     lines = out.splitlines()
     good = [line for line in lines if not COMMAND.fullmatch(line)]
     assert [line.split(": ")[2] for line in good] == ["good", "wrong[A]", "wrong[C]"]
     assert all(line.startswith("as expected: ") for line in good)
-    bad = [match.groups()[:4] for match in map(COMMAND.fullmatch, lines) if match is not None]
-    assert [one[0] for one in bad] == ["wrong.yaml", "wrong.yaml", "broken.yaml", "missing.yaml"]
-    assert bad[2:] == [
+    bad = [match.groups() for match in map(COMMAND.fullmatch, lines) if match is not None]
+    assert [one[:4] for one in bad if one[3] == "experiment file"] == [
         ("broken.yaml", "10", "18", "experiment file"),
         ("missing.yaml", None, None, "experiment file"),
     ]
-
-
-def test_workflow_commands_mark_the_lines(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert run("check", "--format", "github", "wrong.yaml", "silent.yaml") == 1
-    lines = capsys.readouterr().out.splitlines()
-    found = {match[4]: match for match in map(COMMAND.fullmatch, lines) if match is not None}
-    source = {
-        name: (folder / name).read_text(encoding="utf-8").splitlines()
-        for name in ("wrong.yaml", "silent.yaml")
-    }
-    for variant in "BD":
-        match = found[f"rank of wrong[{variant}]"]
-        line, column = int(match[2]), int(match[3])
-        assert source["wrong.yaml"][line - 1][column - 1 :] == "1"
-        assert source["wrong.yaml"][line - 2].strip().startswith("calibration:")
-        assert match[5].startswith(
-            f"wrong.yaml:{line}:{column}: wrong[{variant}]: rank deficiency 2, expected 1; "
-        )
-        assert "%0Aundetermined 2: " in match[5]
-    match = found["rank of silent"]
-    assert source["silent.yaml"][int(match[2]) - 1] == "positions:" and match[3] == "1"
-    assert re.search("rank deficiency [0-9]+, expected full rank", match[5])
+    # Where what is expected is stated, or the positions that leave it.
+    ranks = {one[3]: one for one in bad if one[3].startswith("rank of ")}
+    assert set(ranks) == {"rank of wrong[B]", "rank of wrong[D]", "rank of silent"}
+    for title, (name, number, column, _, text) in ranks.items():
+        source = (folder / name).read_text(encoding="utf-8").splitlines()
+        line = source[int(number) - 1]
+        if name == "silent.yaml":
+            assert line == "positions:" and column == "1"
+            assert re.search("rank deficiency [0-9]+, expected full rank", text)
+            continue
+        assert line[int(column) - 1 :] == "1"
+        assert source[int(number) - 2].strip().startswith("calibration:")
+        told = f"{title.removeprefix('rank of ')}: rank deficiency 2, expected 1; "
+        assert text.startswith(f"wrong.yaml:{number}:{column}: {told}")
+        assert "%0Aundetermined 2: " in text
 
 
 def test_files_are_named_from_the_top_of_the_repository(
     folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("GITHUB_WORKSPACE", str(folder.parent))
-    assert (
-        run(
-            "check",
-            "--format",
-            "github",
-            "broken.yaml",
-            folder / "missing.yaml",
-            "../../elsewhere.yaml",
-        )
-        == 3
-    )
-    names = [
-        match[1]
-        for match in map(COMMAND.fullmatch, capsys.readouterr().out.splitlines())
-        if match is not None
-    ]
+    names = ["broken.yaml", folder / "missing.yaml", "../../elsewhere.yaml"]
+    assert run("check", "--format", "github", *names) == 3
+    lines = capsys.readouterr().out.splitlines()
+    names = [match[1] for match in map(COMMAND.fullmatch, lines) if match is not None]
     assert names == [
         f"{folder.name}/broken.yaml",
         f"{folder.name}/missing.yaml",
@@ -166,24 +144,13 @@ def test_escapes_of_workflow_commands() -> None:
     )
 
 
-def test_no_name_is_taken_for_a_command(folder: Path) -> None:
-    path = folder / "##[error]::stop-commands::x.yaml"
-    path.write_text((folder / "good.yaml").read_text(encoding="utf-8"), encoding="utf-8")
-    (checked,) = check_files([path])
-    (line,) = annotation_lines(checked)
-    assert line.startswith("as expected: ") and "##[" not in line
-
-
 def test_junit_report(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run("check", "--format", "junit", "good.yaml", "wrong.yaml", "broken.yaml") == 3
     out, err = capsys.readouterr()
     assert err == ""
     top = ElementTree.fromstring(out)
-    assert top.tag == "testsuites" and (
-        top.get("tests"),
-        top.get("failures"),
-        top.get("errors"),
-    ) == ("6", "2", "1")
+    assert top.tag == "testsuites"
+    assert [top.get(key) for key in ("tests", "failures", "errors")] == ["6", "2", "1"]
     counts = [
         tuple(suite.get(key) for key in ("name", "tests", "failures", "errors")) for suite in top
     ]
@@ -191,18 +158,9 @@ def test_junit_report(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
         ("good.yaml", "1", "0", "0"), ("wrong.yaml", "4", "2", "0"), ("broken.yaml", "1", "0", "1")
     ]  # fmt: skip
     cases = {case.get("name"): case for case in top.iter("testcase")}
-    assert list(cases) == [
-        "good",
-        "wrong[A]",
-        "wrong[B]",
-        "wrong[C]",
-        "wrong[D]",
-        "experiment file",
-    ]
-    assert [name for name, case in cases.items() if case.find("failure") is not None] == [
-        "wrong[B]",
-        "wrong[D]",
-    ]
+    assert list(cases) == ["good", *(f"wrong[{one}]" for one in "ABCD"), "experiment file"]
+    failed = [name for name, case in cases.items() if case.find("failure") is not None]
+    assert failed == ["wrong[B]", "wrong[D]"]
     failure = cases["wrong[B]"].find("failure")
     assert failure is not None and failure.get("message", "").startswith(
         "rank deficiency 2, expected 1"
@@ -243,49 +201,38 @@ def found_once(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_suggestions_in_every_format(
     folder: Path, found_once: None, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    chosen = ["--variant", "B", "--variant", "C", "wrong.yaml"]
-    assert run("check", *chosen) == 1
-    plain = capsys.readouterr().out
-    assert run("check", "--suggest", *chosen) == 1
-    lines = capsys.readouterr().out.splitlines()
+    def told(*options: str, status: int = 1) -> str:
+        assert run("check", "--variant", "B", "--variant", "C", *options, "wrong.yaml") == status
+        return capsys.readouterr().out
+
+    lines = told("--suggest").splitlines()
     repairs_told = [line for line in lines if line.startswith("repair ")]
     # What is told without suggestions stays as it is, and nothing is suggested where nothing is
     # open.
-    assert [line for line in lines if line not in repairs_told] == plain.splitlines()
+    assert [line for line in lines if line not in repairs_told] == told().splitlines()
     assert repairs_told[0].startswith("repair 1: turn position ") and "full rank" in repairs_told[0]
     assert sum("in the file: " not in line for line in repairs_told) == 2
 
-    assert run("check", "--json", *chosen) == 1
-    before = json.loads(capsys.readouterr().out)
-    assert run("check", "--json", "--suggest", *chosen) == 1
-    bad, good = json.loads(capsys.readouterr().out)
-    assert good.pop("repairs") is None
+    bad, good = json.loads(told("--json", "--suggest"))
     suggested = bad.pop("repairs")
-    assert [bad, good] == before
+    assert good.pop("repairs") is None and [bad, good] == json.loads(told("--json"))
     assert [one["rank_deficiency"] for one in suggested] == [0, 0]
     assert [one["changes"][0]["kind"] for one in suggested] == ["move", "read"]
     assert suggested[0]["edits"][0]["path"].startswith("positions[")
     assert 1e-7 < suggested[0]["average_U6"] < 1e-6
 
-    assert run("check", "--format", "github", "--suggest", *chosen) == 1
-    error, *as_expected = capsys.readouterr().out.splitlines()
+    error, *as_expected = told("--format", "github", "--suggest").splitlines()
     assert as_expected and "repair" not in "".join(as_expected)
     assert "%0Arepair 1: turn position " in error
-    assert run("check", "--format", "junit", "--suggest", *chosen) == 1
-    failure = ElementTree.fromstring(capsys.readouterr().out).find(".//failure")
+    failure = ElementTree.fromstring(told("--format", "junit", "--suggest")).find(".//failure")
     assert failure is not None and "\nrepair 1: turn position " in (failure.text or "")
 
     # A deficiency that is expected is no error, and repaired all the same.
-    (folder / "wrong.yaml").write_text(
-        (folder / "wrong.yaml")
-        .read_text(encoding="utf-8")
-        .replace("deficiency: 1", "deficiency: 2"),
-        encoding="utf-8",
-    )
-    assert run("check", "--format", "github", "--suggest", "--variant", "B", "wrong.yaml") == 0
-    lines = capsys.readouterr().out.splitlines()
-    assert len(lines) == len(repairs_told) + 1
-    assert all(line.startswith("as expected: wrong.yaml: wrong[B]: ") for line in lines)
+    text = (folder / "wrong.yaml").read_text(encoding="utf-8")
+    (folder / "wrong.yaml").write_text(text.replace("deficiency: 1", "deficiency: 2"), "utf-8")
+    lines = told("--format", "github", "--suggest", status=0).splitlines()
+    assert sum("wrong[B]" in line for line in lines) == len(repairs_told) + 1
+    assert all(line.startswith("as expected: wrong.yaml: wrong[") for line in lines)
 
 
 def described(name: str) -> Any:
@@ -318,18 +265,18 @@ def shell(script: str, folder: Path, **variables: str) -> subprocess.CompletedPr
 
 def a_repository(top: Path) -> None:
     """Designs in folders, one of them with a blank in its name, beside YAML files that are none."""
-    text = QUICKSTART.read_text(encoding="utf-8")
-    for name in ("designs/one.yaml", "designs/more/of them.yaml"):
-        path = top / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
-    (top / "settings.yaml").write_text("colour: blue\n", encoding="utf-8")
-    (top / "designs/sweeps").mkdir()
-    (top / "designs/sweeps/size.yaml").write_text("base: ../one.yaml\n", encoding="utf-8")
-    (top / "designs/machines").mkdir()
-    (top / "designs/machines/bridge.yaml").write_text("arrangement: MB1\n", encoding="utf-8")
-    (top / "designs/old/sweeps").mkdir(parents=True)
-    (top / "designs/old/sweeps/size.yaml").write_text("base: ../one.yaml\n", encoding="utf-8")
+    texts = dict.fromkeys(
+        ("designs/one.yaml", "designs/more/of them.yaml"), QUICKSTART.read_text(encoding="utf-8")
+    )
+    texts |= {
+        "settings.yaml": "colour: blue\n",
+        "designs/machines/bridge.yaml": "arrangement: MB1\n",
+    }
+    for name in ("designs/sweeps/size.yaml", "designs/old/sweeps/size.yaml"):
+        texts[name] = "base: ../one.yaml\n"
+    for name, text in texts.items():
+        (top / name).parent.mkdir(parents=True, exist_ok=True)
+        (top / name).write_text(text, encoding="utf-8")
 
 
 def test_the_action_checks(tmp_path: Path) -> None:

@@ -27,34 +27,6 @@ def run(*arguments: str | Path) -> int:
     return main([str(argument) for argument in arguments])
 
 
-def test_check_as_expected(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run("check", QUICKSTART) == 0
-    out, err = capsys.readouterr()
-    assert "full rank, as expected; 174 parameters, 754 observations" in out
-    assert err == ""
-
-
-def test_check_not_as_expected(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    text = (
-        Path("designs/npl/6.1.1.yaml")
-        .read_text(encoding="utf-8")
-        .replace("deficiency: 2", "deficiency: 0")
-    )
-    (tmp_path / "plate.yaml").write_text(text, encoding="utf-8")
-    assert run("check", tmp_path / "plate.yaml", "--variant", "B") == 1
-    out, _ = capsys.readouterr()
-    assert wording.RANK_DEFICIENCY_EXPECTED_FULL_RANK in out
-    assert "undetermined 2: " in out and wording.EXX_POSITIONING_ERROR in out
-
-
-def test_check_json_of_several(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run("check", "--json", "designs/npl/6.1.1.yaml") == 0
-    found = json.loads(capsys.readouterr().out)
-    assert [one["rank_deficiency"] for one in found] == [0, 2, 0, 2]
-    assert [len(one["undetermined"]) for one in found] == [0, 2, 0, 2]
-    assert all(one["as_expected"] for one in found)
-
-
 def test_run_json(capsys: pytest.CaptureFixture[str]) -> None:
     assert run("run", "--json", QUICKSTART) == 0
     found = json.loads(capsys.readouterr().out)
@@ -72,22 +44,6 @@ def test_run_json(capsys: pytest.CaptureFixture[str]) -> None:
     lengths, angles = found["quantities"]["U2 lengths"], found["quantities"]["U2 angles"]
     mixed = (lengths["average"] * lengths["count"] + angles["average"] * angles["count"]) / 30
     assert found["quantities"]["U2"]["average"] == pytest.approx(mixed)
-
-
-def test_run_of_a_deficient_design_tells_what_is_left(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run("run", "--json", "designs/npl/6.2.1.yaml", "--variant", "n=4 NDEL=7") == 0
-    quantities = json.loads(capsys.readouterr().out)["quantities"]
-    # Section 6.2.1: the plate is still accurately calibrated, the machine is not.
-    assert quantities["U5"]["undetermined"] == 0
-    assert 1e-7 < quantities["U5"]["average"] < 2e-7
-    assert (
-        quantities["U6"]["average"] is None
-        and quantities["U6"]["undetermined"] == quantities["U6"]["count"]
-    )
-    assert (
-        quantities["U3 angles"]["undetermined"] == 0
-        and quantities["U3 lengths"]["undetermined"] > 0
-    )
 
 
 def test_run_shows_a_table(capsys: pytest.CaptureFixture[str]) -> None:
@@ -113,12 +69,9 @@ def test_simulate_and_fit(capsys: pytest.CaptureFixture[str], tmp_path: Path) ->
     readings = tmp_path / "readings.csv"
     assert run("simulate", QUICKSTART, "-o", readings) == 0
     first = readings.read_bytes()
-    assert run("simulate", QUICKSTART, "-o", readings, "--seed", "2") == 3
-    assert "exists already" in capsys.readouterr().err and readings.read_bytes() == first
-    assert run("simulate", QUICKSTART, "-o", readings, "--force") == 0
-    assert readings.read_bytes() == first
-    assert run("simulate", QUICKSTART, "-o", readings, "--force", "--seed", "2") == 0
-    assert readings.read_bytes() != first
+    for seed, same in (("1", True), ("2", False)):
+        assert run("simulate", QUICKSTART, "-o", readings, "--force", "--seed", seed) == 0
+        assert (readings.read_bytes() == first) is same
     out, err = capsys.readouterr()
     assert out == "" and "250 readings written" in err
 
@@ -185,15 +138,6 @@ def test_fit_of_wrong_readings(capsys: pytest.CaptureFixture[str], tmp_path: Pat
     assert 'unknown ball "r9c9"' in err and wording.UNKNOWN_PROBE_DID_YOU_MEAN in err
 
 
-def test_fit_needs_every_ball(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    readings = tmp_path / "readings.csv"
-    readings.write_text(
-        "position,ball,probe,x_mm,y_mm,z_mm\nz low,r1c1,down,1,2,3\n", encoding="utf-8"
-    )
-    assert run("fit", QUICKSTART, readings) == 3
-    assert wording.NO_READING_OF_THE_BALLS in capsys.readouterr().err
-
-
 def quickstart_readings(folder: Path, *options: str) -> tuple[Path, list[str]]:
     path = folder / "readings.csv"
     run("simulate", QUICKSTART, "-o", path, *options)
@@ -207,24 +151,6 @@ def test_fit_of_readings_in_another_unit(
     readings.write_text("\n".join([lines[0].replace("_mm", "_m"), *lines[1:]]), encoding="utf-8")
     assert run("fit", QUICKSTART, readings) == 3
     assert wording.FAR_OUTSIDE_THE_VOLUME in capsys.readouterr().err
-
-
-def test_a_wrong_reading_is_warned_of_and_named(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    readings, lines = quickstart_readings(tmp_path)
-    cells = lines[40].split(",")
-    cells[4] = str(float(cells[4]) + 0.005)
-    readings.write_text("\n".join([*lines[:40], ",".join(cells), *lines[41:]]), encoding="utf-8")
-    capsys.readouterr()
-    assert run("fit", "--json", QUICKSTART, readings) == 0
-    out, err = capsys.readouterr()
-    found = json.loads(out)
-    assert found["too_large"] and "warning: S^2 is" in err
-    worst = found["largest_residuals"][0]
-    assert [worst["position"], worst["ball"], worst["probe"], worst["axis"]] == [*cells[:3], "y"]
-    assert run("fit", QUICKSTART, readings) == 0
-    assert f"{cells[0]}" in capsys.readouterr().out.partition("largest residuals")[2]
 
 
 def test_nothing_is_made_of_a_failed_estimate(
@@ -254,7 +180,7 @@ def test_simulated_certificates_are_wrong_by_their_uncertainty(
 ) -> None:
     """Otherwise the residuals would be too small and sigma with them."""
     found = []
-    for seed in range(6):
+    for seed in range(4):
         path = tmp_path / f"{seed}.csv"
         run("simulate", "designs/npl/6.1.1.yaml", "--variant", "C", "-o", path, "--seed", str(seed))
         capsys.readouterr()
@@ -270,63 +196,6 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
         main(["--version"])
     assert caught.value.code == 0
     assert capsys.readouterr().out == f"ballplate {version('ballplate')}\n"
-
-
-def test_a_full_disk_is_told() -> None:
-    with Path("/dev/full").open("w") as full:
-        found = subprocess.run(
-            [sys.executable, "-m", "ballplate", "check", QUICKSTART],
-            stdout=full,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-    assert found.returncode == 3
-    assert (
-        found.stderr.startswith(wording.STANDARD_OUTPUT_CANNOT_BE_WRITTEN)
-        and "Traceback" not in found.stderr
-    )
-
-
-def test_bad_files_give_messages_and_nothing_else(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    text = Path(QUICKSTART).read_text(encoding="utf-8")
-    broken = tmp_path / "broken.yaml"
-    broken.write_text(
-        text.replace("0.2 um            #", "0.2              #")
-        .replace("probes: [down]}", "probes: [dwn]}")
-        .replace("kind: random", "kind: random\n  positoin: 3 um"),
-        encoding="utf-8",
-    )
-    for command in ("check", "run"):
-        assert run(command, broken, tmp_path / "missing.yaml") == 3
-        out, err = capsys.readouterr()
-        assert out == ""
-        assert wording.HAS_NO_UNIT_2 in err
-        assert wording.DID_YOU_MEAN_2 in err and wording.DID_YOU_MEAN in err
-        assert "missing.yaml" in err and "Traceback" not in err
-        lines = err.splitlines()
-        # One each, and one for each position whose probe is mistyped.
-        assert len(lines) == 3 + text.count("probes: [down]}")
-        assert all(line.startswith(str(tmp_path)) for line in lines)
-
-
-def test_true_machine_that_the_model_cannot_be(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    head, tail = Path(QUICKSTART).read_text(encoding="utf-8").split("true_machine:")
-    tail = tail.partition("\n\n")[2]
-    broken = tmp_path / "broken.yaml"
-    broken.write_text(
-        f"{head}true_machine:\n  kind: coefficients\n  values:\n    EXX t^9: 3 um\n    EAX t^1: 3"
-        f" um\n\n{tail}",
-        encoding="utf-8",
-    )
-    assert run("check", broken) == 3
-    lines = capsys.readouterr().err.splitlines()
-    assert len(lines) == 2
-    assert wording.TRUE_MACHINE_VALUES_EXX_THE_ERROR in lines[0]
-    assert wording.AN_ANGLE_IS_EXPECTED in lines[1]
 
 
 def test_a_file_with_variants_needs_a_choice_to_fit(
@@ -417,39 +286,29 @@ def test_usage_is_status_2(arguments: list[str], capsys: pytest.CaptureFixture[s
     assert out == "" and "usage: ballplate" in err
 
 
-def test_all_shipped_designs_are_as_expected() -> None:
-    paths = sorted(
-        path
-        for path in Path("designs").rglob("*.yaml")
-        if path.parent.name not in ("sweeps", "machines")
-    )
-    assert len(paths) >= 11
+DESIGNS = sorted(
+    path
+    for path in Path("designs").rglob("*.yaml")
+    if path.parent.name not in ("sweeps", "machines")
+)
+# Plates in space and in the plane, splines, bars and gauges, a published deficiency.
+FEW = (
+    "quickstart",
+    "6.1.1",
+    "dummy",
+    "scales-in-two-parts",
+    "bar-bell",
+    "bryan-gauge",
+    "deficient",
+)
+
+
+@pytest.mark.parametrize("few", [True, pytest.param(False, marks=pytest.mark.long)])
+def test_shipped_designs_are_as_expected(few: bool) -> None:
+    paths = [path for path in DESIGNS if path.stem in FEW or not few]
+    assert len(paths) >= len(FEW)
     assert run("check", *paths) == 0
     assert run("run", *paths) == 0
-
-
-def test_closed_pipe_is_no_error() -> None:
-    """As in `ballplate check ... | head -1`."""
-    code = "import sys; from ballplate.cli import main; sys.exit(main(sys.argv[1:]))"
-    process = subprocess.Popen(
-        [
-            sys.executable,
-            "-c",
-            code,
-            "check",
-            "--quiet",
-            *3 * [QUICKSTART],
-        ],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        env={**os.environ, "PYTHONPATH": os.getcwd()},
-    )
-    assert process.stdout is not None and process.stderr is not None
-    process.stdout.readline()
-    process.stdout.close()
-    assert process.stderr.read() == b""
-    process.stderr.close()
-    assert process.wait() == 0
 
 
 def test_checking_loads_nothing_slow() -> None:

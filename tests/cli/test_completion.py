@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import argparse
 import shutil
 import subprocess
 from pathlib import Path
 
 import pytest
-from ballplate.cli import completion, main, outputs, parser
+from ballplate.cli import completion, main, outputs
+
+from tests.cli.walk import commands
 
 needs_bash = pytest.mark.skipif(shutil.which("bash") is None, reason="no bash")
 
@@ -46,16 +47,13 @@ def test_commands_options_choices_and_files(
     script = printed(capsys, "bash")
     (tmp_path / "design.yaml").touch()
     (tmp_path / "folder").mkdir()
-    (commands,) = (
-        action for action in parser()._actions if isinstance(action, argparse._SubParsersAction)
-    )
-    every = {name for name in commands.choices if " " not in name}
+    every = {name for name in commands() if " " not in name}
     assert every <= completed(script, tmp_path, "")
     assert completed(script, tmp_path, "re") == {name for name in every if name.startswith("re")}
     for name in every:
         known = {
             option
-            for other, command in commands.choices.items()
+            for other, command in commands().items()
             for option in command._option_string_actions
             if option.startswith("--") and other.split()[0] == name
         }
@@ -70,10 +68,7 @@ def test_each_shell_has_a_script_with_all_commands(
     shell: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     script = printed(capsys, shell)
-    (commands,) = (
-        action for action in parser()._actions if isinstance(action, argparse._SubParsersAction)
-    )
-    words = {word.strip("-") for name in commands.choices for word in name.split()}
+    words = {word.strip("-") for name in commands() for word in name.split()}
     assert all(word in script for word in words)
 
 

@@ -13,17 +13,10 @@ from ballplate.results.fitting import fit
 from ballplate.results.prediction import Prediction
 from ballplate.simulator.design.arrays import State
 from ballplate.simulator.estimation.gauss_newton import linearised_fit
-from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.machines.truth import true_machine
-from ballplate.simulator.readings.generate import (
-    exact_readings,
-    noisy_readings,
-    on_true_machine,
-    true_artefacts,
-)
 from ballplate.simulator.readings.observed_readings import observe
+from ballplate.simulator.readings.simulated import simulated_readings
 
 from tests.reference.random_experiments import random_experiment
 
@@ -55,18 +48,9 @@ def told(of: Prediction | Fit) -> tuple[object, ...]:
 
 def fitted(experiment: Experiment, seed: int | None) -> tuple[Fit, State]:
     """The fit of simulated readings, without noise where there is no seed, and the truth."""
-    design = lay_out(experiment)
-    corners = design.machine.volume.corners
-    on_truth, truth = on_true_machine(
-        design, true_machine(experiment.true_machine, design.model, *corners)
-    )
-    if seed is None:
-        readings, x = exact_readings(on_truth, truth)
-    else:
-        generator = np.random.default_rng(seed)
-        truth = replace(truth, balls=true_artefacts(design, generator))
-        readings, x = noisy_readings(on_truth, truth, generator)
-    return fit(experiment, observe(design, readings, x), sigma="given"), truth
+    given = simulated_readings(experiment, seed, exact=seed is None)
+    observed = observe(given.design, given.readings, given.x)
+    return fit(experiment, observed, sigma="given"), given.truth
 
 
 def assert_says_as_run(experiment: Experiment, seed: int) -> None:
@@ -123,23 +107,17 @@ def test_many_experiments_drawn_at_random(tmp_path: Path) -> None:
     assert len(slow) < 0.01 * 300, slow
 
 
-def test_fewer_readings_than_planned_are_judged_as_they_are(tmp_path: Path) -> None:
+def test_fewer_readings_than_planned_are_judged_as_they_are() -> None:
     """The verdict is that of the readings that there are, with the poses as drawn."""
-    path = tmp_path / "quickstart.yaml"
-    path.write_text(Path("designs/quickstart.yaml").read_text())
-    experiment = load(path)[0]
+    experiment = load("designs/quickstart.yaml")[0]
     some = replace(
         experiment, positions=tuple(one for one in experiment.positions if "y" not in one.name)
     )
     expected = predict(some).verdict.deficiency
-    design = lay_out(experiment)
-    corners = design.machine.volume.corners
-    on_truth, truth = on_true_machine(
-        design, true_machine(experiment.true_machine, design.model, *corners)
-    )
-    readings, x = noisy_readings(on_truth, truth, np.random.default_rng(1))
-    kept = np.flatnonzero(readings.position < 4)
-    found = fit(experiment, observe(design, readings.select(kept), x[kept]))
+    given = simulated_readings(experiment)
+    kept = np.flatnonzero(given.readings.position < 4)
+    some_read = observe(given.design, given.readings.select(kept), given.x[kept])
+    found = fit(experiment, some_read)
     assert expected > 0
     # Poses of positions that were not read are open, too.
     assert found.verdict.deficiency == expected + 12

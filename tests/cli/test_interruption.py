@@ -79,9 +79,7 @@ def test_one_that_was_swallowed_ends_monte_carlo(
     assert wording.THE_RESULTS_ARE_THOSE in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    "module", ["ballplate.cli.common", "ballplate.simulator.inputs.messages", "numpy", "joblib"]
-)
+@pytest.mark.parametrize("module", ["ballplate.simulator.inputs.messages", "numpy", "joblib"])
 def test_while_modules_are_loaded(tmp_path: Path, module: str) -> None:
     """The first second of every command is this."""
     path = small_sweep(tmp_path, 3)

@@ -2,22 +2,15 @@
 
 from __future__ import annotations
 
-import argparse
 from pathlib import Path
 from random import Random
 
 import ballplate as bp
 import pytest
-from ballplate.cli import main, parser
+from ballplate.cli import main
 
 from tests.cli import wording
-
-
-def commands() -> dict[str, argparse.ArgumentParser]:
-    (found,) = (
-        action for action in parser()._actions if isinstance(action, argparse._SubParsersAction)
-    )
-    return dict(found.choices)
+from tests.cli.walk import commands
 
 
 def complaint(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:

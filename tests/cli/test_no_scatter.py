@@ -3,26 +3,21 @@
 from __future__ import annotations
 
 import json
-import re
 from pathlib import Path
+from typing import Any
 
 import ballplate as bp
 import numpy as np
 import pytest
+import yaml
 from ballplate.cli import main
-from ballplate.simulator.estimation.functions import MeasuredPoints, displacements
-from ballplate.simulator.estimation.linearisation import linearise
-from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.inputs.quantities import LengthFunction, Target
-from ballplate.uncertainty.pairs import all_pairs
-from ballplate.uncertainty.summaries import uncertainties
 
-TRUTH = re.compile(r"true_machine:\n(  .*\n)+")
-TARGET = re.compile(r"target_uncertainty: .*\n")
-TASKS = (
-    "  probe: down\n  tasks: [{name: across, from: [100 mm, 100 mm, 100 mm],"
-    " to: [600 mm, 100 mm, 100 mm], probes: [down, right], target_uncertainty: 1 um}]\n"
-)
+from tests.reference.small_quickstart import small_sections
+
+ACROSS = {"from": ["100 mm", "100 mm", "100 mm"], "to": ["600 mm", "100 mm", "100 mm"]}
+TASK = ACROSS | {"name": "across", "probes": ["down", "right"], "target_uncertainty": "1 um"}
+ZERO = {"kind": "zero"}
+RANDOM = {"kind": "random", "position": "2 um", "rotation": "4 urad", "seed": 7}
 PLANE = """
 title: plane
 machine: {volume: [1 m, 1 m], repeatability: 0.2 um}
@@ -39,26 +34,23 @@ evaluation: {points: {random: 12, seed: 1}}
 """
 
 
-def quickstart(truth: str, target: bool) -> str:
-    """The quickstart with a machine of a kind, with or without a target, and a task."""
-    text, count = TRUTH.subn(
-        f"true_machine: {truth}\n", Path("designs/quickstart.yaml").read_text(encoding="utf-8")
-    )
-    assert count == 1 and TARGET.search(text) and text.count("  probe: down\n") == 1
-    text = text.replace("  probe: down\n", TASKS if target else "  probe: down\n")
-    return text if target else TARGET.sub("", text)
-
-
-ZERO, RANDOM = "{kind: zero}", "{kind: random, position: 2 um, rotation: 4 urad, seed: 7}"
+def written(path: Path, truth: dict[str, Any], target: bool) -> Path:
+    """The first example with a machine of a kind, and with or without a target and a task."""
+    sections = small_sections(true_machine=truth)
+    if target:
+        sections["evaluation"]["tasks"] = [TASK]
+    else:
+        del sections["target_uncertainty"]
+    path.write_text(yaml.safe_dump(sections), encoding="utf-8")
+    return path
 
 
 @pytest.mark.parametrize("truth", [ZERO, RANDOM], ids=["zero", "rounding"])
 @pytest.mark.parametrize("target", [True, False], ids=["target", "none"])
 def test_a_fit_without_scatter_says_so(
-    truth: str, target: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    truth: dict[str, Any], target: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    path, readings = tmp_path / "it.yaml", tmp_path / "it.csv"
-    path.write_text(quickstart(truth, target), encoding="utf-8")
+    path, readings = written(tmp_path / "it.yaml", truth, target), tmp_path / "it.csv"
     assert main(["simulate", str(path), "--exact", "-o", str(readings)]) == 0
     capsys.readouterr()
     picture = tmp_path / "residuals.svg"
@@ -86,9 +78,7 @@ def test_a_fit_without_scatter_says_so(
 
 
 def test_from_python(tmp_path: Path) -> None:
-    path = tmp_path / "it.yaml"
-    path.write_text(quickstart(ZERO, True), encoding="utf-8")
-    experiment = bp.load(path)
+    experiment = bp.load(written(tmp_path / "it.yaml", ZERO, True))
     fit = bp.fit(experiment, bp.simulate(experiment, exact=True))
     assert fit.sigma == 0.0 and fit.without_scatter and "sigma 0" in repr(fit)
     assert not fit.covariance("machine").to_numpy().any()
@@ -109,26 +99,3 @@ def test_every_estimator_in_the_plane(
     for options in ([], ["--json"]):
         assert main(["fit", str(path), str(readings), "--estimator", estimator, *options]) == 0
         assert "nan" not in capsys.readouterr().out.lower().split()
-
-
-@pytest.mark.parametrize("sigma", [0.0, 1e-320, 1e-200, 0.3, 1.0, 40.0])
-def test_the_share_within_the_target_is_counted_for_any_sigma(sigma: float) -> None:
-    """Against each distance compared by itself."""
-    design = lay_out(bp.quickstart())
-    at = linearise(design)
-    target = Target(LengthFunction(0.5e-6, 1e-6), 2.0)
-    found = uncertainties(at, sigma, target, ("U6",))["U6"]
-    points = design.evaluation.points
-    places = MeasuredPoints(points, np.full(len(points), design.evaluation.probe))
-    covariance = displacements(at, places).common
-    drawn = places.at(design, at.state)
-    first, second = np.triu_indices(len(points), 1)
-    apart = drawn[first] - drawn[second]
-    length = np.linalg.norm(apart, axis=1)
-    unit = apart / length[:, None]
-    each = np.linalg.norm(
-        np.einsum("md,mdr->mr", unit, covariance[first] - covariance[second]), axis=1
-    )
-    within = 2.0 * sigma * each <= 0.5e-6 + 1e-6 * length
-    assert found.within_target == pytest.approx(within.mean(), abs=1.5 / len(within))
-    assert all_pairs(displacements(at, places), places.labels).within == 0

@@ -31,7 +31,7 @@ def test_links_in_a_circle(
         assert "internal error" not in told and ("loop" in told or "own" in told)
 
 
-@pytest.mark.parametrize("value", [1e308, -1.7e308, 1e200, 1e5])
+@pytest.mark.parametrize("value", [-1.7e308, 1e5])
 def test_a_map_of_no_machine(
     value: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -95,12 +95,3 @@ def test_no_printed_line_is_a_command_of_a_workflow(
             main([*command.split(), name])
             told = "".join(capsys.readouterr())
             assert not re.search(r"(?m)^\s*::", told), told
-
-
-def test_a_data_frame_where_a_name_is_wanted() -> None:
-    import pandas
-
-    frame = pandas.DataFrame({"a": [1.0]})
-    quickstart = bp.quickstart()
-    with pytest.raises(ValueError, match="sigma: .* is unknown"):
-        bp.fit(quickstart, bp.simulate(quickstart), sigma=frame)  # type: ignore[arg-type]

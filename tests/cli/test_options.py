@@ -15,9 +15,9 @@ from typing import Any
 
 import openpyxl
 import pytest
-from ballplate.cli import parser
 
 from tests.cli.option_table import READING, TABLE, TABLES
+from tests.cli.walk import WALK, commands
 from tests.robustness.kit import POOL, make_kit
 from tests.robustness.worker import outcome
 
@@ -48,47 +48,24 @@ SECOND = (
     .replace("plane: x", "plane: x, artefact: plate")
     .replace("[{kind: dist", "[{artefact: plate, kind: dist")
 )
-OUTER = PLATE.replace(
-    "{kind: grid, balls: [3, 3], size: [300 mm, 300 mm]}", "{kind: balls, file: ../outside.csv}"
-)
-INNER = """\
-title: files of the folder above
-base: outer.yaml
-axes: {repeatability: {path: machine.repeatability, values: [1 um, 2 um]}}
-record: [U6]
-"""
 OFFSETS = {"down": (0.0, 0.0, -50.0), "right": (60.0, 0.0, 0.0)}
-REPORT = """\
-FILNAM/'WITHOUT A UNIT'
-F(ZLOW_R1C1)=FEAT/SPHERE,OUTER,CART,1,2,3,22
-FA(ZLOW_R1C1)=FEAT/SPHERE,OUTER,CART,1.0,2.0,3.0,22.0
-FA(ZLOW_R1C5)=FEAT/CIRCLE,INNER,CART,4.0,2.0,3.0,0,0,1,20.0
-ENDFIL
-"""
-
-SURFACE = "FILNAM/'POINTS'\nUNITS/MM,ANGDEC\nF(ZLOW_R1C1)=FEAT/SPHERE,OUTER,CART,0,0,0,20\nMEAS/SPHERE,F(ZLOW_R1C1),6\n"
-SURFACE += (
-    "".join(
-        f"PTMEAS/CART,{10.001 * x},{9.998 * y},{10 * z},{x},{y},{z}\n"
-        for x, y, z in ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0.6, 0.8, 0))
-    )
-    + "ENDMES\nENDFIL\n"
-)
-BALLS = "ball,x_mm,y_mm,z_mm\na,0,0,0\nb,300,0,0\nc,0,300,0\nd,300,300,0\n"
-
 # Progress bars are all that they print beside their results, and only on a terminal.
 SILENT = (
     *("check", "compare", "correct", "diff", "map", "map --curves", "reach", "reproduce", "run"),
     *("run --errors", "run --reliability", "schema", "spline", "studio"),
     *("sweep", "sweep --export", "sweep --report"),
 )
-# Shown by other tests, as the page; or what no small command shows: a search ends alike from any seed.
+# Shown by other tests, as the page and what needs files of its own; or what no small command shows: a
+# search ends alike from any seed.
 ELSEWHERE = {
     "studio --variant",
     "studio --port",
     "studio --no-browser",
     "studio --verbose",
     "sweep --scheduler",
+    "sweep --folder",
+    "check --no-modules",
+    *(f"import --{name}" for name in ("unit", "circles", "uncertainty")),
     "plan --seed",
     *(f"{name} --workers" for name in ("run", "plan", "sweep")),
 }
@@ -102,18 +79,11 @@ def kit(tmp_path_factory: pytest.TempPathFactory) -> Path:
     make_kit(folder)
     (folder / "pipe.csv").unlink()
     (folder / "loop.csv").unlink()
-    (folder / "inner").mkdir()
     texts = {
         "plate.yaml": PLATE,
         "pair.yaml": PLATE + VARIANTS,
         "twice.yaml": POOL + VARIANTS,
         "plates.yaml": SECOND,
-        "no-unit.dmo": REPORT,
-        "outside.csv": BALLS,
-        "inner/outer.yaml": OUTER,
-        "inner/sweep.yaml": INNER,
-        "surface.dmo": SURFACE,
-        "own.yaml": PLATE.replace("{kind: metric}", "{kind: python, object: own:build}"),
         "anonymous.csv": "name,x_mm,y_mm,z_mm\nA,50,200,100\n",
     }
     for name, text in texts.items():
@@ -163,30 +133,58 @@ def _write_tables(folder: Path) -> None:
     workbook.save(folder / "two.xlsx")
 
 
+def stamps(folder: Path) -> dict[Path, tuple[int, int]]:
+    """What changes where a file of a folder is written."""
+    found = {path: path.stat() for path in folder.rglob("*") if path.is_file()}
+    return {path: (one.st_mtime_ns, one.st_ino) for path, one in found.items()}
+
+
 @cache
 def written(line: str, kit: Path) -> str:
-    """Status, outputs and files of a command in a copy of the kit."""
+    """Status, outputs and files of a command in a copy of the kit, which is put right again."""
     folder = kit.with_name("copy")
-    shutil.copytree(kit, folder)
-    before = {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
+    if not folder.exists():
+        shutil.copytree(kit, folder)
+    before = stamps(folder)
     status, out, err = outcome(shlex.split(line), folder)
-    parts = [f"status {status}", out, err]
-    for path in sorted(folder.rglob("*")):
-        if path.is_file() and path.read_bytes() != before.get(path):
-            parts += [f"--file {path.name}", path.read_bytes().decode("utf-8", "replace")]
-    shutil.rmtree(folder)
+    parts, after = [f"status {status}", out, err], stamps(folder)
+    for path in sorted(path for path in after if after[path] != before.get(path)):
+        parts += [f"--file {path.name}", path.read_bytes().decode("utf-8", "replace")]
+        path.unlink()
+    for path in before:
+        if not path.exists():
+            shutil.copy2(kit / path.relative_to(folder), path)
     return "\n".join(parts)
 
 
-def first_lines() -> dict[str, str]:
-    """A line of each command in the table."""
-    return {shlex.split(line)[0]: line for line, *_ in reversed(TABLE)}
+def options() -> Iterator[tuple[str, argparse.Action]]:
+    """Each option of each command, other than help."""
+    for name, command in commands().items():
+        for action in command._actions:
+            if action.option_strings and action.dest != "help":
+                yield name, action
 
 
-ALL = (
+# A line of each command in the table, of a file without variants, and the commands that write data
+# in JSON.
+FIRST = {
+    shlex.split(line)[0]: line
+    for line, *_ in reversed(TABLE)
+    if not {"pair.yaml", "twice.yaml"} & {*line.split()}
+}
+FIRST |= {
+    "run --errors": "'run --errors' plate.yaml",
+    "reach": "reach plate.yaml --by repeatability",
+}
+FIRST["compare"] = "compare plate.yaml --trials 2"
+AS_DATA = [name for name, action in options() if "--json" in action.option_strings]
+LATER = pytest.mark.long
+ALL: list[Any] = [
     *TABLE,
+    *((FIRST[name], "--json", '{\n  "') for name in AS_DATA),
+    # The commands take tables of readings in the same way.
     *(
-        (f"{name} plate.yaml {file}", option, text)
+        pytest.param(f"{name} plate.yaml {file}", option, text, marks=[LATER] * (name != "fit"))
         for name, text in READING.items()
         for file, option in TABLES
     ),
@@ -195,8 +193,12 @@ ALL = (
         for name in READING
     ),
     *((f"{name} pair.yaml plate.csv", "--variant coarse", text) for name, text in READING.items()),
-    *((line, "--verbose", "\nnumpy ") for line in first_lines().values() if line != "schema"),
-)
+    *(
+        pytest.param(line, "--verbose", "\nnumpy ", marks=[LATER] * (name not in ("check", "map")))
+        for name, line in FIRST.items()
+        if name != "schema"
+    ),
+]
 
 
 @pytest.mark.parametrize(("line", "option", "text"), ALL)
@@ -208,25 +210,15 @@ def test_option(line: str, option: str, text: str, kit: Path) -> None:
     assert text in with_it and text not in without
 
 
-def options() -> Iterator[tuple[str, argparse.Action]]:
-    """Each option of each command, other than help."""
-    (commands,) = (
-        action.choices
-        for action in parser()._actions
-        if isinstance(action, argparse._SubParsersAction)
-    )
-    for name, command in commands.items():
-        for action in command._actions:
-            if action.option_strings and action.dest != "help":
-                yield name, action
-
-
 def test_every_option_is_in_the_table() -> None:
-    stated = {(shlex.split(line)[0], shlex.split(option)[0]) for line, option, _ in ALL}
+    rows = [getattr(row, "values", row) for row in ALL]
+    stated = {(shlex.split(line)[0], shlex.split(option)[0]) for line, option, _ in rows}
     missing = [
         f"{name} {action.option_strings[-1]}"
         for name, action in options()
         if not any((name, form) in stated for form in action.option_strings)
     ]
     silent = {f"{name} --quiet" for name in SILENT}
-    assert sorted(missing) == sorted(silent | ELSEWHERE)
+    # Whatever is written, it is by the same function, and tested beside it.
+    force = {f"{name} --force" for name, walk in WALK.items() if walk.writes}
+    assert sorted(missing) == sorted(silent | force | ELSEWHERE)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -163,17 +164,6 @@ def test_too_far_from_a_quarter_turn(
     assert turned == pytest.approx(float(angle), abs=1e-4)
 
 
-def test_readings_without_noise(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """A nanometre beside rounding errors is no reason for a warning."""
-    path, readings = tmp_path / "near.yaml", str(tmp_path / "r.csv")
-    path.write_text(Path(ANGLES).read_text().replace("rotation: 90 deg", "rotation: 90.001 deg"))
-    chosen = ["--variant", "quarter turn"]
-    told(capsys, "simulate", str(path), "-o", readings, *chosen, "--exact")
-    found = data(capsys, "fit", str(path), readings, *chosen, *REVERSAL)
-    assert found["sigma"] < 1e-10 and found["neglected_standard_uncertainties"] < 0.5
-    assert told(capsys, "fit", str(path), readings, *chosen, *REVERSAL)[1] == ""
-
-
 def test_positions_at_any_angles(capsys: pytest.CaptureFixture[str]) -> None:
     """The readings shipped give their true machine and plate back, within their uncertainties."""
     found = data(
@@ -259,50 +249,11 @@ def test_balls_read_in_one_position_are_left_out(tmp_path: Path) -> None:
     assert wording.LEAVES_OUT_WHAT_IS_NOT_READ in one.cautions[0]
 
 
-def test_the_reversals_uncertainties_are_those_of_multiple_redundancy() -> None:
-    """Where nothing is neglected and all is read alike, both are the same estimate."""
-    experiment = bp.load(ANGLES, "quarter turn")
-    for sigma in ("given", "estimated"):
-        found = bp.fit(experiment, bp.simulate(experiment), sigma, **AS_REVERSAL)
-        for one, other in zip(found.estimates, found.redundant, strict=True):
-            np.testing.assert_allclose(
-                one.standard_uncertainty, other.standard_uncertainty, rtol=1e-3
-            )
-
-
 def test_no_reversal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Everything that is not as it should be is named at once, at its place, with nothing on
     standard output.
     """
-    path, readings = tmp_path / "e.yaml", tmp_path / "r.csv"
-    told(capsys, "simulate", ANGLES, "-o", str(readings), "--variant", "quarter turn")
-    lines = readings.read_text().splitlines()
-    readings.write_text(
-        "\n".join(line for line in lines if ",r1c4," not in line or "straight" in line) + "\n"
-    )
-    out, err = told(
-        capsys, "fit", ANGLES, str(readings), "--variant", "quarter turn", *REVERSAL, status=3
-    )
-    assert out == ""
-    assert (
-        f"{readings}: the reversal needs the balls that define the plate's axes in both positions;"
-        ' in "turned by 90" the readings lack "r1c4"; ' in err
-    )
-    out, err = told(
-        capsys, "simulate", ANGLES, "-o", str(tmp_path / "h.csv"), "--variant", "half a turn"
-    )
-    out, err = told(
-        capsys,
-        "fit",
-        ANGLES,
-        str(tmp_path / "h.csv"),
-        "--variant",
-        "half a turn",
-        *REVERSAL,
-        status=3,
-    )
-    assert out == ""
-    assert wording.A_TURN_OF_DEGREES_LIES_BETWEEN in err
+    path, readings = tmp_path / "e.yaml", str(tmp_path / "r.csv")
     path.write_text(
         "title: t\n"
         "machine: {volume: [1 m, 1 m, 1 m], repeatability: 0.2 um}\n"
@@ -316,52 +267,44 @@ def test_no_reversal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
         "  - {name: high, artefact: plate, plane: z, level: 500 mm, corner: {x: 0 mm, y: 0 mm}}\n"
         "  - {name: there, artefact: ball, pose: {origin: [0 mm, 0 mm, 0 mm]}}\n"
     )
-    told(capsys, "simulate", str(path), "-o", str(tmp_path / "s.csv"))
-    out, err = told(capsys, "fit", str(path), str(tmp_path / "s.csv"), *REVERSAL, status=3)
-    assert out == "" and [
-        line.removeprefix(f"{path}:").split(", not")[0] for line in err.splitlines()
-    ] == [
+    told(capsys, "simulate", str(path), "-o", readings)
+    out, err = told(capsys, "fit", str(path), readings, *REVERSAL, status=3)
+    found = [line.removeprefix(f"{path}:").split(", not")[0] for line in err.splitlines()]
+    assert out == "" and found == [
         wording.THE_REVERSAL_NEEDS_A_MACHINE,
         wording.THE_REVERSAL_TAKES_ONE_ARTEFACT,
         wording.THE_REVERSAL_TAKES_TWO_POSITIONS,
     ]
 
 
-def test_several_probes_and_priors(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path, readings = tmp_path / "e.yaml", tmp_path / "r.csv"
-    text = (
-        Path(ANGLES)
-        .read_text()
-        .replace("rotation: 37 deg", "rotation: 90 deg")
-        .replace("[400 mm, 150", "[700 mm, 150")
-    )
-    positions = "".join(
-        line.replace("}}", "}, probes: [a, b]}") + "\n"
-        for line in text.splitlines()
-        if "  - {name: " in line
-    )
-    text = (
-        text.partition("positions:")[0]
-        + "probes: {a: [0 mm, 0 mm], b: [20 mm, 0 mm]}\npositions:\n"
-    )
-    path.write_text(text + "".join(f"{line}\n" for line in positions.splitlines()[:2]))
-    told(capsys, "simulate", str(path), "-o", str(readings))
-    _, err = told(capsys, "fit", str(path), str(readings), *REVERSAL, status=3)
-    assert (
-        f"{readings}: the reversal takes readings with one probe, not with a, b; keep those"
-        " with one" in err
-    )
-    readings.write_text(
-        "".join(f"{line}\n" for line in readings.read_text().splitlines() if ",b," not in line)
-    )
-    one = data(capsys, "fit", str(path), str(readings), *REVERSAL)
-    assert one["estimates"]["alpha"]["value"] == pytest.approx(12e-6, abs=2e-6)
-    path.write_text(
-        path.read_text() + "priors: [{parameter: gamma, standard_uncertainty: 1 ppm}]\n"
-    )
-    assert data(capsys, "fit", str(path), str(readings), *REVERSAL)["scale"] == "x"
-    _, err = told(capsys, "fit", str(path), str(readings), *REVERSAL, "--scale", "none", status=3)
-    assert wording.PRIORS_REFER_TO_THE_FILES_ERROR in err
+def refused(experiment: bp.Experiment, readings: Any, words: str, **options: Any) -> None:
+    with pytest.raises(bp.ExperimentError, match=re.escape(words)):
+        bp.fit(experiment, readings, **AS_REVERSAL, **options)
+
+
+def test_readings_that_are_no_reversal() -> None:
+    quarter, half = bp.load(ANGLES, "quarter turn"), bp.load(ANGLES, "half a turn")
+    readings = bp.simulate(quarter)
+    there = (readings.ball != "r1c4") | (readings.position == "straight")
+    told = "the reversal needs the balls that define the plate's axes in both positions; in"
+    refused(quarter, readings[there], f'{told} "turned by 90" the readings lack "r1c4"; ')
+    refused(half, bp.simulate(half), wording.A_TURN_OF_DEGREES_LIES_BETWEEN)
+
+
+def test_several_probes_and_priors() -> None:
+    two = {"a": ["0 mm", "0 mm"], "b": ["20 mm", "0 mm"]}
+    both = {f"positions[{k}].probes": ["a", "b"] for k in range(2)}
+    experiment = bp.load(ANGLES, "quarter turn").with_({"probes": two, **both})
+    readings = bp.simulate(experiment)
+    told = "the reversal takes readings with one probe, not with a, b; keep those with one"
+    refused(experiment, readings, told)
+    one = bp.fit(experiment, readings[readings.probe == "a"], **AS_REVERSAL)
+    assert one.to_dict()["estimates"]["alpha"]["value"] == pytest.approx(12e-6, abs=2e-6)
+    prior = [{"parameter": "gamma", "standard_uncertainty": "1 ppm"}]
+    known = bp.load(ANGLES, "quarter turn").with_({"priors": prior})
+    readings = bp.simulate(known)
+    assert bp.fit(known, readings, **AS_REVERSAL).to_dict()["scale"] == "x"
+    refused(known, readings, wording.PRIORS_REFER_TO_THE_FILES_ERROR, scale="none")
 
 
 def test_options_of_the_reversal_alone(capsys: pytest.CaptureFixture[str]) -> None:

@@ -30,15 +30,8 @@ pytestmark = pytest.mark.skipif(
 )
 
 DESIGNS = ROOT / "designs"
-PLAN = (
-    "plan",
-    DESIGNS / "planning/campaign.yaml",
-    "--curve",
-    "-o",
-    "choice.yaml",
-    "--sheet",
-    "sheet.html",
-)
+PLAN = ("plan", DESIGNS / "planning/campaign.yaml", "--curve")
+PLAN += ("-o", "choice.yaml", "--sheet", "sheet.html")
 TRIALS = ("run", DESIGNS / "npl/6.2.7.yaml", "--trials", "1000000")
 
 # Commands that may last over a second, with the seconds of processor time up to which they are
@@ -58,13 +51,8 @@ ENDING = {
     "reach": (("reach", DESIGNS / "npl/5.3.yaml", "--variant", "kinematic fit"), 1.5),
     "reliability": (
         (
-            "run",
-            "--reliability",
-            DESIGNS / "npl/6.2.7.yaml",
-            "--variant",
-            "7 x 7",
-            "-o",
-            "all.csv",
+            *("run", "--reliability", DESIGNS / "npl/6.2.7.yaml"),
+            *("--variant", "7 x 7", "-o", "all.csv"),
         ),
         1.0,
     ),
@@ -80,16 +68,8 @@ ENDING = {
         0.8,
     ),
 }
-OUTPUTS = (
-    "choice.yaml",
-    "sheet.html",
-    "page.html",
-    "table.csv",
-    "points.csv",
-    "all.csv",
-    "map.png",
-)
-OUTPUTS += ("readings.csv", "c.csv")
+OUTPUTS = ("choice.yaml", "sheet.html", "page.html", "table.csv", "points.csv", "all.csv")
+OUTPUTS += ("map.png", "readings.csv", "c.csv")
 WORDS = {signal.SIGINT: "interrupted", signal.SIGTERM: "terminated"}
 
 
@@ -205,14 +185,7 @@ def interrupted(
 
 
 # With workers and without, with files and without, with a store; the others are as these.
-SOME = (
-    "run by two",
-    "plan by one",
-    "plan by two",
-    "sweep by one",
-    "report",
-    "reproduce",
-)
+SOME = ("run by two", "plan by one", "plan by two", "sweep by one", "report", "reproduce")
 
 
 @pytest.mark.parametrize("name", SOME)

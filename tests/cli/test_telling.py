@@ -13,6 +13,9 @@ from pathlib import Path
 import pytest
 from ballplate.cli import main
 
+from tests.cli.walk import small_file
+from tests.reference.small_quickstart import small_sections
+
 QUICKSTART = "designs/quickstart.yaml"
 
 
@@ -24,14 +27,15 @@ def told(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, s
 
 
 @pytest.mark.parametrize("command", ["check", "run --reliability"])
-def test_results_are_the_same(command: str, capsys: pytest.CaptureFixture[str]) -> None:
-    plain, quiet, verbose = (
-        told(capsys, command, QUICKSTART, *more) for more in ([], ["-q"], ["-v"])
-    )
+def test_results_are_the_same(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = small_file(tmp_path / "small.yaml")
+    plain, quiet, verbose = (told(capsys, command, file, *more) for more in ([], ["-q"], ["-v"]))
     assert plain[:2] == quiet[:2] == verbose[:2] and plain[2] == quiet[2] == []
     lines = verbose[2]
     assert lines[0] == f"ballplate {version('ballplate')}" and f"numpy {version('numpy')}" in lines
-    assert f"reads {QUICKSTART}" in lines
+    assert f"reads {file}" in lines
     assert re.fullmatch(
         rf"{command}: [0-9.e-]+ s, [0-9.e-]+ s of the processor in this process", lines[-1]
     )
@@ -60,15 +64,15 @@ def test_a_deficient_check_names_the_next_command(
 ) -> None:
     """And that command does what is said of it; a deficiency that is expected needs none."""
     file = tmp_path / "two planes.yaml"
-    lines = Path(QUICKSTART).read_text(encoding="utf-8").splitlines(keepends=True)
-    file.write_text("".join(line for line in lines if "{name: y" not in line), encoding="utf-8")
+    read = [one for one in small_sections()["positions"] if one["plane"] != "y"]
+    small_file(file, positions=read)
     status, _, lines = told(capsys, "check", file)
     assert status == 1 and lines == [f"next: ballplate check {shlex.quote(str(file))} --suggest"]
     status, out, lines = told(capsys, *shlex.split(lines[0])[2:])
     assert status == 1 and lines == [] and "full rank" in out
     assert told(capsys, "check", file, "-q")[2] == []
     assert told(capsys, "check", file, "--format", "github")[2] == []
-    expected = file.read_text(encoding="utf-8").replace("deficiency: 0", "deficiency: 5")
+    expected = file.read_text(encoding="utf-8").replace("deficiency: 0", "deficiency: 3")
     file.write_text(expected, encoding="utf-8")
     assert told(capsys, "check", file)[0::2] == (0, [])
 
@@ -84,14 +88,15 @@ def test_doubts_about_the_verdict_stay(tmp_path: Path, capsys: pytest.CaptureFix
 
 
 def test_no_bar_when_quiet(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    file = small_file(tmp_path / "small.yaml")
     with monkeypatch.context() as patched:
         patched.setattr(type(sys.stderr), "isatty", lambda self: True)
-        shown = "".join(told(capsys, "run", "--reliability", QUICKSTART)[2])
-        # Three co-ordinates of 25 balls in ten positions, and four distances.
-        assert re.search("observations: .* 754/754", shown)
-        assert told(capsys, "run", "--reliability", QUICKSTART, "-q")[2] == []
+        shown = "".join(told(capsys, "run", "--reliability", file)[2])
+        # Three co-ordinates of 9 balls in ten positions, and four distances.
+        assert re.search("observations: .* 274/274", shown)
+        assert told(capsys, "run", "--reliability", file, "-q")[2] == []
 
 
 def test_check_shows_how_far_it_has_come(
@@ -112,12 +117,9 @@ def test_check_shows_how_far_it_has_come(
     assert told(capsys, "check", "designs/quickstart.yaml")[2] == []
 
 
-@pytest.mark.parametrize("command", ["check", "run"])
-def test_singular_values_are_printed_on_request(
-    capsys: pytest.CaptureFixture[str], command: str
-) -> None:
-    _, plain, quiet = told(capsys, command, QUICKSTART)
-    _, out, verbose = told(capsys, command, QUICKSTART, "-v")
+def test_singular_values_are_printed_on_request(capsys: pytest.CaptureFixture[str]) -> None:
+    _, plain, quiet = told(capsys, "check", QUICKSTART)
+    _, out, verbose = told(capsys, "check", QUICKSTART, "-v")
     assert plain == out and not any("singular" in line for line in [plain, *quiet])
     assert sum(line.startswith("singular values 117 to 0.118,") for line in verbose) == 1
 

@@ -12,6 +12,7 @@ from ballplate.cli import main
 
 from tests.cli import wording
 from tests.cli.test_check_formats import described, shell
+from tests.cli.walk import small_file
 
 QUICKSTART = Path(__file__).parents[2] / "designs" / "quickstart.yaml"
 MODEL = """\
@@ -84,16 +85,8 @@ def test_the_hook_and_the_action_refuse_modules(tmp_path: Path) -> None:
 
 def test_the_action_runs_no_module_of_the_change_that_it_checks(tmp_path: Path) -> None:
     pytest.importorskip("pip")
-    hostile = (
-        "pip",
-        "ballplate",
-        "yaml",
-        "numpy",
-        "sitecustomize",
-        "usercustomize",
-        "argparse",
-        "site",
-    )
+    hostile = ["pip", "ballplate", "yaml", "numpy", "argparse", "site"]
+    hostile += ["sitecustomize", "usercustomize"]
     for name in hostile:
         (tmp_path / f"{name}.py").write_text(
             f"from pathlib import Path\nPath({str(tmp_path / 'intruder')!r}).touch()\n",
@@ -113,17 +106,11 @@ def test_patterns_are_expanded_without_a_shell(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    names = [
-        "a.yaml",
-        "b/c.yaml",
-        "b/d/e f.yaml",
-        "b/[x].yaml",
-        "sweeps/s.yaml",
-        "b/machines/m.yaml",
-    ]
+    names = ["a.yaml", "b/c.yaml", "b/d/e f.yaml", "b/[x].yaml", "sweeps/s.yaml"]
+    names += ["b/machines/m.yaml"]
     for name in names:
         Path(name).parent.mkdir(parents=True, exist_ok=True)
-        Path(name).write_text(QUICKSTART.read_text(encoding="utf-8"), encoding="utf-8")
+        small_file(Path(name))
 
     def checked(*patterns: str, status: int = 0) -> list[str]:
         assert main(["check", "--format", "github", "--", *patterns]) == status
@@ -148,31 +135,25 @@ def test_names_of_files_are_no_commands(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    text = QUICKSTART.read_text(encoding="utf-8")
-    wrong = text.replace("expected_rank_deficiency: 0", "expected_rank_deficiency: 1")
     for k, name in enumerate(
         ("a\n::warning::b.yaml", "c\r::error::d.yaml", "\x1b[31m##[error]e.yaml")
     ):
         Path(name).mkdir()
-        Path(name, "design.yaml").write_text(text, encoding="utf-8")
-        Path(name, "wrong.yaml").write_text(wrong, encoding="utf-8")
+        small_file(Path(name, "design.yaml"))
+        small_file(Path(name, "wrong.yaml"), expected_rank_deficiency=1)
         Path(name, "broken.yaml").write_text("title: [", encoding="utf-8")
-        assert (
-            main(
-                [
-                    "check",
-                    "--format",
-                    "github",
-                    *(f"{name}/{one}.yaml" for one in ("design", "wrong", "broken")),
-                ]
-            )
-            == 3
-        )
+        files = [f"{name}/{one}.yaml" for one in ("design", "wrong", "broken")]
+        assert main(["check", "--format", "github", *files]) == 3
         out = capsys.readouterr().out
         lines = out.split("\n")[:-1]
         assert len(lines) == 3, k
         assert "\r" not in out and "\x1b" not in out and "##[" not in lines[0]
         assert not any(line.startswith(("::warning", "::error::")) for line in lines)
+        # A report is printed on the log of a server that reads commands in it.
+        assert main(["check", "--format", "junit", *files]) == 3
+        lines = capsys.readouterr().out.splitlines()
+        assert not any(line.startswith("::") for line in lines)
+        assert any("[31m" in line or "\\x0" in line for line in lines)
 
 
 @pytest.mark.parametrize(
@@ -217,21 +198,3 @@ def test_what_is_written_is_told_without_control_characters(
         out, err = capsys.readouterr()
         told = [text for text in (out + err).splitlines() if "[31m" in text]
         assert told and all(text.isprintable() for text in told), line
-
-
-def test_a_report_for_build_servers_has_no_lines_of_a_name(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Printed on the log of a server that reads commands in it."""
-    monkeypatch.chdir(tmp_path)
-    text = QUICKSTART.read_text(encoding="utf-8")
-    names = "a\n::error::b.yaml", "c\n::error::d.yaml"
-    Path(names[0]).write_text(text, encoding="utf-8")
-    Path(names[1]).write_text(
-        text.replace("expected_rank_deficiency: 0", "expected_rank_deficiency: 1"), encoding="utf-8"
-    )
-    assert main(["check", "--format", "junit", *names]) == 1
-    lines = capsys.readouterr().out.splitlines()
-    assert not any(line.startswith("::") for line in lines) and any(
-        "\\x0a::error::" in line for line in lines
-    )

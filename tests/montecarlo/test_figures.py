@@ -21,7 +21,6 @@ from ballplate.montecarlo.figures import (
     MonteCarloEstimate,
     MonteCarloOutcome,
     outcome,
-    power_of_misfit,
 )
 from ballplate.montecarlo.reference import Reference, reference
 from ballplate.montecarlo.replicates import BATCH, Estimates, estimate_batch
@@ -146,9 +145,8 @@ def test_the_same_bits_however_the_work_is_shared(workers: int) -> None:
     assert expected.trials == 700
 
 
-@pytest.mark.parametrize("workers", [1, 2])
-def test_a_run_ends_when_it_is_accurate_enough(workers: int) -> None:
-    found = run_trials(quickstart(), 1, 100_000, until=0.02, workers=workers)
+def test_a_run_ends_when_it_is_accurate_enough() -> None:
+    found = run_trials(quickstart(), 1, 100_000, until=0.02, workers=2)
     worst = max(one.spread.error / one.spread.value for one in found.comparisons.values())
     assert found.trials == 512 and worst <= 0.02
 
@@ -160,22 +158,6 @@ def test_an_interruption_keeps_what_is_done() -> None:
     found = run_trials(quickstart(), 1, 5000, report=interrupt)
     assert found.interrupted and found.trials == 512
     assert replace(found, interrupted=False) == run_trials(quickstart(), 1, 512)
-
-
-def test_a_replicate_that_does_not_converge_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    shared = quickstart()
-    aims = targets(shared)
-    found = estimate_batch(shared, 1, 2)
-    failed = replace(found, converged=found.converged & (np.arange(BATCH) != 5))
-    total = accumulate(shared, aims, failed, 60)
-    assert (total.count, total.failed) == (59, (2 * BATCH + 5,))
-    assert accumulate(shared, aims, failed, 4).failed == ()
-    none = outcome(
-        shared,
-        aims,
-        accumulate(shared, aims, replace(found, converged=found.converged & False), 60),
-    )
-    assert none.comparisons == {} and len(none.failed) == 60
 
 
 def test_too_poor_a_model_is_too_optimistic() -> None:
@@ -315,16 +297,6 @@ def test_distances_that_the_model_leaves_alone_are_not_counted() -> None:
     counted = done.outcome.comparisons["U6"]
     assert counted.count == 27
     assert abs(counted.spread.value - 1.0) < 4.0 * counted.spread.error
-
-
-def test_power_of_a_misfit() -> None:
-    """Against a simulation of shifted normal variables."""
-    generator = np.random.default_rng(1)
-    shift = np.zeros(20)
-    shift[0] = 4.0
-    squares = ((generator.standard_normal((40_000, 20)) + shift) ** 2).sum(axis=1)
-    limit = np.quantile((generator.standard_normal((400_000, 20)) ** 2).sum(axis=1), 0.95)
-    assert power_of_misfit(20, 16.0) == pytest.approx(float((squares > limit).mean()), abs=0.01)
 
 
 def test_a_sample_of_pairs_has_each_pair_once() -> None:

@@ -16,7 +16,6 @@ import pytest
 import yaml
 from ballplate.montecarlo.accumulator import Accumulator, accumulate
 from ballplate.montecarlo.complete_fits import complete_fit
-from ballplate.montecarlo.expansion import Direct, Expansion, expand
 from ballplate.montecarlo.experiments import true_experiment
 from ballplate.montecarlo.figures import outcome
 from ballplate.montecarlo.reference import Reference, Truth, reference
@@ -28,8 +27,6 @@ from ballplate.simulator.design.observations.coordinates import CalibratedCoordi
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.estimation.functions import Parameters
 from ballplate.simulator.geometry.motions import vector_from_rotation
-from ballplate.simulator.machines.protocol import ErrorModel
-from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
 from ballplate.uncertainty.kernel_quantities import QuantityKind
 from ballplate.uncertainty.quantities import QUANTITIES
 from numpy.typing import NDArray
@@ -269,94 +266,3 @@ def test_what_is_almost_certain_is_as_certain_as_a_share_of_the_best_axis(share:
     own = shared.design.of(CalibratedCoordinates).uncertainty
     np.testing.assert_allclose(own, max(share, 1.0) * least)
     assert len(shared.design.of(CalibratedDistances)) == 0
-
-
-MODELS: dict[str, ErrorModel] = {
-    "kinematic": small().model,
-    "metric": SpatialMetricModel(True, (0.0, 0.0, 0.0), (1.0, 1.0, 1.0)),
-}
-
-
-class Neighbourhood:
-    """A model about some readings, with small changes of everything."""
-
-    def __init__(self, model: ErrorModel, with_offsets: bool, seed: int = 1) -> None:
-        generator = np.random.default_rng(seed)
-        self.model = model
-        m, n, b = 7, len(self.model.parameters), 4
-        effect = np.array([one.effect for one in self.model.parameters])
-        self.x, self.p = generator.uniform(0.1, 0.9, (m, 3)), generator.uniform(-0.05, 0.05, (m, 3))
-        self.a = 1e-5 * generator.standard_normal(n) / effect
-        self.step = 1e-6 * generator.standard_normal((b, n)) / effect
-        self.moved = 1e-6 * generator.standard_normal((b, 3, m))
-        self.offsets = 1e-6 * generator.standard_normal((b, 3, m)) if with_offsets else None
-        self.pull = generator.standard_normal((b, 3, m))
-        self.expansion = expand(self.model, self.x, self.a, self.p, with_offsets)
-
-    def error(self, k: int, x: Real, step: Real, p: Real) -> Real:
-        """The correction (m, 3) of a replicate, where readings, parameters and offsets differ more."""
-        offsets = 0.0 if self.offsets is None else self.offsets[k].T
-        place = self.x + self.moved[k].T + x
-        return np.asarray(self.model.error(place, self.a + step, self.p + offsets + p))
-
-
-@pytest.mark.parametrize("with_offsets", [False, True])
-def test_an_expansion_is_the_model_nearby(with_offsets: bool) -> None:
-    """Its change is that of the model, and what it gathers the derivative of that."""
-    given = Neighbourhood(MODELS["kinematic"], with_offsets)
-    value = given.model.error(given.x, given.a, given.p)
-    direct = Direct(given.model, given.x, given.a, given.p, value)
-    step = given.step
-    for one in (given.expansion, direct):
-        change = one.change(given.moved, step, given.offsets)
-        gathered = one.gather(given.moved, step, given.pull, given.offsets)
-        by_offset = one.gather_offsets(step, given.pull) if with_offsets else None
-        for k in range(len(given.pull)):
-            own = given.step[k]
-            expected = given.error(k, 0.0, own, 0.0) - value
-            tolerance = 1e-5 * np.abs(expected).max()
-            np.testing.assert_allclose(change[k].T, expected, rtol=0, atol=tolerance)
-            # The model is linear in its parameters, so that whole steps have no error.
-            derivative = [
-                (given.error(k, 0.0, own + unit, 0.0) - given.error(k, 0.0, own - unit, 0.0)) / 2.0
-                for unit in np.eye(len(given.a))
-            ]
-            wanted = np.array([(given.pull[k].T * each).sum() for each in derivative])
-            np.testing.assert_allclose(
-                gathered[k], wanted, rtol=0, atol=1e-5 * np.abs(wanted).max()
-            )
-            if by_offset is not None:
-                wanted = np.stack(
-                    [
-                        (
-                            (
-                                given.error(k, 0.0, own, 1e-2 * axis)
-                                - given.error(k, 0.0, own, -1e-2 * axis)
-                            )
-                            / 2e-2
-                            * given.pull[k].T
-                        ).sum(axis=1)
-                        for axis in np.eye(3)
-                    ]
-                )
-                np.testing.assert_allclose(by_offset[k], wanted, rtol=0, atol=1e-5)
-
-
-@pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
-def test_an_expansion_has_the_parameters_that_matter_and_no_rounding(model: ErrorModel) -> None:
-    """Those whose derivative is another one at other places, and those that have one."""
-    given = Neighbourhood(model, False)
-    generator = np.random.default_rng(2)
-    whole = [
-        given.model.jacobian(generator.uniform(0.1, 0.9, given.x.shape), given.a, given.p)
-        for _ in range(3)
-    ]
-    here = given.model.jacobian(given.x, given.a, given.p)
-    found = given.expansion
-    assert isinstance(found, Expansion) and found.size == len(given.a)
-    for i in range(3):
-        matter = np.abs(here[:, i]).max(axis=0) > 0.0
-        np.testing.assert_array_equal(found.columns[i], np.flatnonzero(matter))
-        differ = np.ptp([one[:, i] for one in whole], axis=0).max(axis=0) > 1e-8
-        np.testing.assert_array_equal(found.mixed_columns[i], np.flatnonzero(differ))
-        assert found.mixed[i].shape == (differ.sum(), 3 * len(given.x))

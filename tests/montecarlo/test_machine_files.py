@@ -14,12 +14,15 @@ from ballplate.montecarlo.targets import targets
 from ballplate.simulator.experiment.loading import load
 
 SHIPPED = Path("designs/park")
-KEYS = {
-    "as shipped": "",
-    "reference point in the middle": "reference_point: [450 mm, 575 mm, 200 mm]\n",
-    "end points": "reference_point: [900 mm, 300 mm, 0 mm]\n",
-    "minimum zone": "reference_point: [450 mm, 575 mm, 200 mm]\n",
-}
+MIDDLE = "reference_point: [450 mm, 575 mm, 200 mm]\n"
+# Criteria of straightness, and what is stated of the reference point.
+STATED = [
+    ("least squares", ""),
+    ("least squares", MIDDLE),
+    ("end points", "reference_point: [900 mm, 300 mm, 0 mm]\n"),
+    ("minimum zone", MIDDLE),
+]
+NPL_LIKE = (SHIPPED / "machines/npl-like.yaml").read_text(encoding="utf-8")
 MACHINE = "{kind: machine, file: machine.yaml}"
 
 
@@ -51,18 +54,13 @@ def assert_followed(path: Path) -> None:
         assert np.abs(target.base / target.uncertainty).max() < 1e-4, target.symbol
 
 
-@pytest.mark.parametrize("name", KEYS)
+@pytest.mark.parametrize(("criterion", "point"), STATED)
 @pytest.mark.parametrize("arrangement", ["MB1", "FB1"])
 def test_neither_reference_point_nor_straight_lines_are_a_misfit(
-    tmp_path: Path, name: str, arrangement: str
+    tmp_path: Path, criterion: str, point: str, arrangement: str
 ) -> None:
-    machine = (
-        (SHIPPED / "machines/npl-like.yaml").read_text(encoding="utf-8").replace("MB1", arrangement)
-    )
-    criterion = name if name in ("end points", "minimum zone") else "least squares"
-    machine = (
-        machine.replace("straightness: least squares", f"straightness: {criterion}") + KEYS[name]
-    )
+    machine = NPL_LIKE.replace("MB1", arrangement) + point
+    machine = machine.replace("straightness: least squares", f"straightness: {criterion}")
     if arrangement == "FB1":
         # The lever of a table's rotation is one power more than the rotation.
         machine = machine.replace(
@@ -73,17 +71,14 @@ def test_neither_reference_point_nor_straight_lines_are_a_misfit(
 
 
 def test_a_kinematic_model_holds_the_x_axis(tmp_path: Path) -> None:
-    machine = (SHIPPED / "machines/npl-like.yaml").read_text(encoding="utf-8")
-    model = (
-        "{kind: kinematic, arrangement: MB1, position_coefficients: 4, rotation_coefficients: 3}"
-    )
-    assert_followed(written(tmp_path, machine, error_model=model))
+    model = "{kind: kinematic, arrangement: MB1, position_coefficients: 4"
+    model += ", rotation_coefficients: 3}"
+    assert_followed(written(tmp_path, NPL_LIKE, error_model=model))
 
 
 def test_a_part_of_the_volume(tmp_path: Path) -> None:
-    machine = (SHIPPED / "machines/npl-like.yaml").read_text(encoding="utf-8")
-    machine = machine.replace("x: [0 mm, 900 mm]", "x: [-300 mm, 1200 mm]")
-    assert_followed(written(tmp_path, machine))
+    wider = NPL_LIKE.replace("x: [0 mm, 900 mm]", "x: [-300 mm, 1200 mm]")
+    assert_followed(written(tmp_path, wider))
 
 
 def test_the_bend_of_an_arm_is_part_of_its_straightness(tmp_path: Path) -> None:
@@ -92,8 +87,7 @@ def test_the_bend_of_an_arm_is_part_of_its_straightness(tmp_path: Path) -> None:
 
 
 def test_expansion_is_estimated_where_no_positioning_error_is_stated(tmp_path: Path) -> None:
-    machine = (SHIPPED / "machines/npl-like.yaml").read_text(encoding="utf-8")
-    stated = [line for line in machine.splitlines() if not line.startswith(("  EYY:", "  EZZ:"))]
+    stated = [line for line in NPL_LIKE.splitlines() if not line.startswith(("  EYY:", "  EZZ:"))]
     path = written(tmp_path, "\n".join(stated))
     (experiment,) = load(path)
     design, _ = true_experiment(experiment)
