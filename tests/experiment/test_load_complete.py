@@ -1,6 +1,5 @@
 """A file that uses every key, and a plane one that uses few: what the program gets to see."""
 
-import pickle
 from pathlib import Path
 
 import numpy as np
@@ -277,9 +276,3 @@ def test_plane_experiment_with_defaults(plane: Experiment) -> None:
     )
     assert distances.dimensions == 2
     assert coordinates.axes == (0, 1) and coordinates.values.shape == (48, 2)
-
-
-def test_experiments_can_be_sent_to_another_process(complete: Experiment) -> None:
-    copy = pickle.loads(pickle.dumps(complete))
-    np.testing.assert_array_equal(copy.positions[0].pose.origin, complete.positions[0].pose.origin)
-    assert copy.artefacts == complete.artefacts

@@ -39,11 +39,6 @@ def test_plain_scalars(text: str, value: object) -> None:
     assert found == value and type(found) is type(value)
 
 
-def test_not_a_number() -> None:
-    found = resolve_scalar(".nan")
-    assert isinstance(found, float) and math.isnan(found)
-
-
 @given(st.floats(allow_nan=False, allow_infinity=False))
 def test_floats_are_read_again(value: float) -> None:
     assert resolve_scalar(repr(value)) == value
@@ -207,9 +202,3 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
         refusal(latin)
         == f"{latin}:2:4: byte 0xb5 is not UTF-8; save the file with the encoding UTF-8"
     )
-
-
-def test_byte_order_mark_is_skipped(tmp_path: Path) -> None:
-    path = tmp_path / "bom.yaml"
-    path.write_bytes(b"\xef\xbb\xbfa: 1\n")
-    assert to_python(read_tree(path)) == {"a": 1}
