@@ -272,7 +272,6 @@ def compare(design: Design, state: State, problem: dense.Problem, x: Real | None
 
 
 FULL_RANK = [
-    (grid_of_four, 5),
     (certified_coordinates, 5),
     (neighbour_distances, 5),
     (unequal_axes, 5),
@@ -291,19 +290,6 @@ def test_every_uncertainty_of_a_design_of_full_rank(
 ) -> None:
     design = with_points(make())
     assert compare(design, nominal_state(design), dense.planned(design, coefficients, 5)) == 0
-
-
-@pytest.mark.parametrize(
-    ("make", "coefficients", "deficiency"),
-    [(deficient_grid_of_four, 7, 6)],
-)
-def test_rank_and_what_is_left_determined_of_a_deficient_design(
-    make: Callable[[], Design], coefficients: int, deficiency: int
-) -> None:
-    design = with_points(make(), 8)
-    assert (
-        compare(design, nominal_state(design), dense.planned(design, coefficients, 5)) == deficiency
-    )
 
 
 @pytest.mark.parametrize(("make", "coefficients", "deficiency"), [(deficient_grid_of_four, 7, 6)])

@@ -18,7 +18,6 @@ from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.gauss_newton import moved
 from ballplate.simulator.estimation.length_equations import LengthEstimator, length_estimate
 from ballplate.simulator.estimation.linearisation import linearise
-from ballplate.simulator.estimation.spheres import fit_sphere
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
@@ -295,22 +294,6 @@ def test_each_repeat_of_a_gauge_is_a_length_of_its_own(tmp_path: Path) -> None:
     assert (
         len(observed.design.of(Lengths)) == 120
         and len(np.unique(observed.design.of(Lengths).first)) == 120
-    )
-
-
-def test_a_sphere_through_points(tmp_path: Path) -> None:
-    generator = np.random.default_rng(3)
-    directions = generator.standard_normal((20, 3))
-    directions /= np.linalg.norm(directions, axis=1)[:, None]
-    centre, radius = fit_sphere([1.0, 2.0, 3.0] + 0.25 * directions, np.zeros(3))
-    np.testing.assert_allclose(centre, [1.0, 2.0, 3.0], rtol=0, atol=1e-14)
-    assert radius == pytest.approx(0.25, abs=1e-14)
-    flat = np.array([1.0, 2.0, 3.0]) + 0.25 * np.column_stack(
-        [np.cos(range(9)), np.sin(range(9)), np.zeros(9)]
-    )
-    # Points on a circle leave the height of the centre as it is.
-    np.testing.assert_allclose(
-        fit_sphere(flat, np.array([0.0, 0.0, 2.9]))[0], [1.0, 2.0, 2.9], atol=1e-14
     )
 
 

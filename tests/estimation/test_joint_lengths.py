@@ -222,11 +222,8 @@ FULL = {
 
 
 def test_replicates_of_a_model_that_is_not_linear(tmp_path: Path) -> None:
-    assert_honest(experiment(tmp_path, bar(3), ALL, **TRUE, **FULL), 64)
-
-
-def assert_honest(made: Experiment, count: int) -> None:
-    found = trials(made, count).outcome
+    count = 64
+    found = trials(experiment(tmp_path, bar(3), ALL, **TRUE, **FULL), count).outcome
     assert found is not None
     assert found.trials == count and not found.failed
     for symbol in ("U1", "U2", "U3", "U4", "U5", "U6"):

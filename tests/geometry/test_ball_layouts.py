@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from ballplate.simulator.geometry.artefacts import ARTEFACTS, AnyArtefactSettings
-from ballplate.simulator.geometry.ball_layouts import BallLayout, coincident_balls, corners, pairs
+from ballplate.simulator.geometry.artefacts import AnyArtefactSettings
+from ballplate.simulator.geometry.ball_layouts import BallLayout, corners, pairs
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import TypeAdapter
@@ -41,10 +41,6 @@ def test_pair_sets_of_a_grid() -> None:
     assert ("r1c2", "r2c2") in named(GRID, "neighbours")
     assert len(pairs(GRID, "all")) == 15
     assert [GRID.names[i] for i in corners(GRID)] == ["r1c1", "r1c3", "r2c1", "r2c3"]
-
-
-def test_neighbours_of_seven_by_seven() -> None:
-    assert len(pairs(layout(kind="grid", balls=(7, 7), size=("1 m", "1 m")), "neighbours")) == 84
 
 
 @given(st.integers(2, 30))
@@ -86,15 +82,3 @@ def test_sets_that_are_not_defined() -> None:
         pairs(balls, "neighbours")
     with pytest.raises(ValueError, match=wording.IS_NOT_DEFINED_LIST_THE_BALLS):
         corners(balls)
-
-
-def test_coincident_balls() -> None:
-    balls = layout(
-        kind="balls", coordinates=(("0 mm", "0 mm"), ("1 mm", "0 mm"), ("0 mm", "0.1 nm"))
-    )
-    assert coincident_balls(balls) == [(0, 2)]
-
-
-def test_every_registered_kind_has_its_own_name() -> None:
-    for kind, settings in ARTEFACTS.items():
-        assert settings.model_json_schema()["properties"]["kind"]["const"] == kind

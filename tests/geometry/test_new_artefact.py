@@ -63,9 +63,6 @@ print(json.dumps({
     "balls": fitted.solution.state.balls.tolist(),
     "S^2": fitted.solution.factor.sum_of_squares,
     "pairs": bp.fit(start, bp.simulate(start), estimator="distances", pairs="diameters").to_dict(),
-    "by command": json.loads(
-        said("fit", base, readings, "--estimator", "distances", "--pairs", "diameters", "--json")
-    ),
     "schema": json.loads(said("schema")),
     "missing": said("check", str(folder / "missing.yaml")),
     "wrong set": refused(lambda: bp.load(folder / "wrong.yaml")),
@@ -157,7 +154,7 @@ def test_a_fit_minimises_the_sum_of_squares(told: dict[str, Any], problem: dense
 
 
 def test_estimators_of_distances_take_its_pairs(told: dict[str, Any]) -> None:
-    assert told["pairs"]["pairs"] == told["by command"]["pairs"] == len(DIAMETERS)
+    assert told["pairs"]["pairs"] == len(DIAMETERS)
     known = "choose from: neighbours, diameters, all"
     assert wording.IS_NOT_DEFINED_2 in told["wrong pairs"]
     assert known in told["wrong pairs"]
