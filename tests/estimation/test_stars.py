@@ -220,8 +220,14 @@ def test_a_star_that_points_elsewhere_is_found(place: str) -> None:
 
 
 def test_replicates_follow_the_estimator_exactly() -> None:
-    """With a star turned by a degree and loosely known tips, so that turns are not small."""
-    design = lay_out(small({"standard_uncertainty": "20 um"}))
+    """With a star turned by a degree and loosely known tips, so that turns are not small; with a
+    certificate of co-ordinates and a prior on a turn besides.
+    """
+    places = {"kind": "coordinates", "balls": ["r1c1", "r3c2"], "standard_uncertainty": "0.2 um"}
+    sides = {"kind": "distances", "pairs": "corners", "standard_uncertainty": "0.3 um"}
+    prior = {"parameter": "x low: rotation y", "standard_uncertainty": "10 urad"}
+    star = {"standard_uncertainty": "20 um"}
+    design = lay_out(small(star, calibration=[sides, places], priors=[prior]))
     drawn = nominal_state(design)
     turn = rotation_from_vector(np.array([[0.01, -0.02, 0.015]]))[0]
     shared = reference(design, Truth(replace(drawn, probes=TIPS @ turn.T), design.model))

@@ -24,7 +24,6 @@ from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
-from ballplate.simulator.experiment.model import Position
 from ballplate.simulator.readings.reading_files import read_readings, write_readings
 from ballplate.simulator.readings.simulated import simulated_readings
 from ballplate.uncertainty.quantities import QUANTITIES
@@ -170,67 +169,9 @@ PAIRS: dict[str, Pair] = {
         {DISTANCES: UNCERTAIN | {"standard_uncertainty": dict.fromkeys("xyz", "0.5 um")}},
     ),
     # Variants and full text, by group and by item.
-    "variant": Pair(
-        {Z + ".level": "300 mm", "machine.repeatability": "0.3 um"},
-        {
-            "variants": {
-                "other": {"positions[z low].level": "0.3 m", "machine.repeatability": "300 nm"}
-            }
-        },
-    ),
-    "candidates of a group": Pair(
-        {
-            "pool": {
-                "candidates": [
-                    {
-                        "planes": ["z"],
-                        "levels": {"from": "100 mm", "to": "300 mm", "count": 2},
-                        "corners": {"x": ["0 mm", "200 mm"], "y": "100 mm"},
-                        "quarter_turns": 1,
-                        "probes": ["down"],
-                    }
-                ]
-            }
-        },
-        {
-            "pool": {
-                "candidates": [
-                    {
-                        "name": f"{level} {x}",
-                        "plane": "z",
-                        "level": f"{level} mm",
-                        "corner": {"x": f"{x} mm", "y": "100 mm"},
-                        "quarter_turns": 1,
-                        "probes": ["down"],
-                        "times": {"set_up": "20 min"},
-                    }
-                    for level in (100, 300)
-                    for x in (0, 200)
-                ]
-            }
-        },
-    ),
     "terms of the true machine": Pair(
         {"true_machine.values": {"EXX t": "30 um", "EAY t^2": "20 urad"}},
         {"true_machine.values": {"EXX t^1": "0.03 mm", "EAY t^2": "20e-6 rad"}},
-    ),
-    "curves of the true machine": Pair(
-        {"true_machine.values": {"EXX t": "30 um", "EAY t": "20 urad"}},
-        {"true_machine": {"kind": "curves", "arrangement": "MB2", "files": ["x.csv", "y.csv"]}},
-        files={
-            "x.csv": "position_mm,EXX_um\n0,0\n1000,30\n",
-            "y.csv": "position_mm,EAY_urad\n0,0\n400,8\n1000,20\n",
-        },
-    ),
-    "coefficients of each function": Pair(
-        {},
-        {
-            "error_model.functions": {
-                **{f"E{a}{b}": 3 for a in "XYZABC" for b in "XYZ"},
-            },
-            "error_model.position_coefficients": 5,
-            "error_model.rotation_coefficients": 4,
-        },
     ),
     "arrangement in full": Pair(
         {}, {"error_model.arrangement": {"probe_side": ["x", "y", "z"], "workpiece_side": []}}
@@ -337,39 +278,6 @@ PAIRS: dict[str, Pair] = {
         {DISTANCES + ".pairs": "corners"},
         {DISTANCES + ".pairs": [*SIDES, ["r1c1", "r3c3"], ["r1c3", "r3c1"]]},
     ),
-    "distances in a file": Pair(
-        {},
-        {
-            DISTANCES + ".values": "sides.csv",
-            DISTANCES + ".pairs": SIDES,
-            DISTANCES + ".standard_uncertainty": None,
-        },
-        files={
-            "sides.csv": "ball_1,ball_2,distance_mm,expanded_uncertainty_um,k\n"
-            + "".join(f"{a},{b},750,0.4,2\n" for a, b in SIDES)
-        },
-    ),
-    "covariance of independent values": Pair(
-        {},
-        {
-            DISTANCES + ".pairs": SIDES,
-            DISTANCES + ".standard_uncertainty": None,
-            DISTANCES + ".values": [{"balls": pair, "distance": "750 mm"} for pair in SIDES],
-            DISTANCES + ".covariance": "covariance.csv",
-        },
-        files={
-            "covariance.csv": "\n".join(
-                ",".join(row)
-                for row in [
-                    ["covariance_um2", *map(" ".join, SIDES)],
-                    *(
-                        [" ".join(side), *("0.04" if side == other else "0" for other in SIDES)]
-                        for side in SIDES
-                    ),
-                ]
-            )
-        },
-    ),
     "co-ordinates with U": Pair(
         {DISTANCES: UNCERTAIN | {"standard_uncertainty": "0.5 um"}},
         {DISTANCES: {"kind": "coordinates", "values": "balls.csv", "coverage_factor": 2}},
@@ -422,23 +330,6 @@ PAIRS: dict[str, Pair] = {
         ),
         influences({"kind": "position scale", "standard_uncertainty": "0.5 ppm"}),
     ),
-    "plate and scales in two items": Pair(
-        temperature(
-            **WARM,
-            artefact_temperature=SENSOR,
-            scale_expansion=exact("8 um/m/K"),
-            scale_temperature=SENSOR,
-        ),
-        influences(
-            {"kind": "temperature", "artefact": "plate", **WARM, "artefact_temperature": SENSOR},
-            {
-                "kind": "temperature",
-                "reference": "20 degC",
-                "scale_expansion": exact("8 um/m/K"),
-                "scale_temperature": SENSOR,
-            },
-        ),
-    ),
     "temperature of the plate by position": Pair(
         temperature(**WARM, artefact_temperature=SENSOR),
         temperature(
@@ -455,15 +346,6 @@ PAIRS: dict[str, Pair] = {
                 "each": ["position", "probe"],
                 "standard_uncertainty": "1 um",
             }
-        ),
-    ),
-    "re-indexing in items": Pair(
-        influences(
-            {"kind": "re-indexing", "standard_uncertainty": "1 um", "probes": ["left", "back"]}
-        ),
-        influences(
-            {"kind": "re-indexing", "standard_uncertainty": "1 um", "probes": ["back"]},
-            {"kind": "re-indexing", "standard_uncertainty": "1 um", "probes": ["left"]},
         ),
     ),
     "reproducibility of each reading": Pair(
@@ -536,23 +418,6 @@ PAIRS: dict[str, Pair] = {
         influences(SAG | {"shape": [{"factor": -1, "x": 2}]}),
         influences(SAG | {"shape": [{"factor": -3, "x": 2, "y": 0}]}),
     ),
-    "drift with its times of all": Pair(
-        influences(
-            {
-                "kind": "drift",
-                "scale": {"standard_uncertainty": "0.5 ppm/h"},
-                "times": {"reading": "20 s", "set_up": "10 min"},
-            }
-        ),
-        influences(
-            {
-                "kind": "drift",
-                "scale": {"standard_uncertainty": "0.5 um/m/h", "value": "0 ppm/h"},
-                "times": {"set_up": "600 s", "reading": "1 s"},
-                "positions": {place: {"reading": "20 s"} for place in PLACES},
-            }
-        ),
-    ),
     # Other artefacts and models.
     "repeats of a hole plate": Pair(
         {f"{Z}.repeats": 4, f"{X}.repeats": 4},
@@ -589,11 +454,6 @@ PAIRS: dict[str, Pair] = {
         {"artefacts.bar.role": "length_standard", "calibration.0.values": None},
         design="certified/ball-bar",
         in_order=False,
-    ),
-    "repeats of a gauge": Pair(
-        {"positions.0.repeats": 4},
-        {"positions.0.standard_uncertainty": "0.5 um"},
-        design="certified/bryan-gauge",
     ),
     "repeats in two dimensions": Pair(
         {"positions.0.repeats": 4, "positions.0.standard_uncertainty": "1 um"},
@@ -632,11 +492,6 @@ PAIRS: dict[str, Pair] = {
         {DISTANCES + ".standard_uncertainty": "0.1 um + 1 ppm"},
         {DISTANCES + ".standard_uncertainty": "0.85 um"},
     ),
-    "points in a file": Pair(
-        {},
-        {"evaluation.points": {"file": "points.csv"}},
-        files={"points.csv": "x_mm,y_mm,z_mm\n100,200,300\n700,600,500\n250,800,50\n"},
-    ),
     "points drawn": Pair(
         {"evaluation.points": {"random": 5}}, {"evaluation.points": {"random": 5, "seed": 1}}
     ),
@@ -670,12 +525,6 @@ def figures(tree: dict[str, Any], folder: Path, pair: Pair) -> dict[str, Any]:
         [np.nan if target is None else target.at(length) for length in (0.0, 0.3, 1.0)]
         for target in [experiment.target_uncertainty, *targets]
     ]
-    if experiment.pool is not None:
-        found["candidates"] = [
-            [candidate.seconds, *candidate.item.pose.origin, *candidate.item.pose.rotation.ravel()]
-            for candidate in experiment.pool.candidates
-            if isinstance(candidate.item, Position)
-        ]
     return found
 
 

@@ -98,7 +98,6 @@ def test_aliases_stand_where_they_are_used() -> None:
                 " value"
             ],
         ),
-        ("? [a]\n: 1\n", ["f:1:3: a key must be a single word or text; write key: value"]),
         ('"": 1\n', ["f:1:1: an empty key; write a name before the colon"]),
         (
             "a: !!int 1\nb: !x 2\n",
@@ -108,7 +107,6 @@ def test_aliases_stand_where_they_are_used() -> None:
             ],
         ),
         ("a: *b\n", ["f:1:4: no anchor &b; write the value out"]),
-        ("a: &b 1\nc: *d\n", ["f:2:4: no anchor &d; known: &b"]),
         (
             "a: &b [*b]\n",
             ["f:1:8: the alias *b is inside the value that it refers to; write the value out"],
@@ -129,14 +127,6 @@ def test_aliases_stand_where_they_are_used() -> None:
             ],
         ),
         (
-            "a: {b: 1\n",
-            [
-                "f:1:4: not valid YAML: a mapping in braces is never closed or lacks a comma; write"
-                " {a: 1, b: 2}, quotes about a text with brackets"
-            ],
-        ),
-        ("x: 1\na: 'b\n", ["f:2:4: not valid YAML: a quotation mark is never closed; close it"]),
-        (
             "a: b: c\n",
             [
                 "f:1:5: not valid YAML: a second “: ” in one line; quote a text that contains"
@@ -155,10 +145,6 @@ def test_aliases_stand_where_they_are_used() -> None:
         (
             "a: " + "[" * 5000,
             [f"f:1:{4 + DEEPEST - 1}: nested more than {DEEPEST} deep; check the brackets"],
-        ),
-        (
-            "µ: 😀\nb: [" + "{a: " * 5000,
-            [f"f:2:{5 + (DEEPEST - 2) * 4}: nested more than {DEEPEST} deep; check the brackets"],
         ),
         (
             "a: 1\na: 2\nb: " + "[" * 5000 + "]" * 5000,

@@ -9,7 +9,6 @@ from typing import Any
 import ballplate as bp
 import numpy as np
 import pytest
-import yaml
 from ballplate.simulator.design.observations.coordinates import CoordinateCalibration
 from ballplate.simulator.design.observations.distances import DistanceCalibration
 from ballplate.simulator.experiment.named_files import named_by
@@ -18,6 +17,7 @@ from ballplate.simulator.inputs.messages import ExperimentError
 from tests.observations import wording
 from tests.observations.test_joint_values import BALLS, Real, covariance_file, written
 from tests.reference import certificates as dcc
+from tests.reference.small_quickstart import small_sections
 
 PAIRS = [("r1c1", "r1c3"), ("r3c1", "r3c3"), ("r1c1", "r3c1"), ("r1c3", "r3c3")]
 MM = ["600.0004", "599.9998", "600.0011", "600.0007"]
@@ -610,25 +610,16 @@ def test_exact_lengths_of_a_standard_are_the_limit_of_small_ones(tmp_path: Path)
 
 def standards(folder: Path, plate: dict[str, Any], uncertainty: str, repeatability: str) -> Any:
     """A plate, and a bar that is read in one place."""
-    found = yaml.safe_load((Path(__file__).parents[2] / "designs" / "quickstart.yaml").read_text())
+    found = small_sections()
     bar = {"kind": "two_spheres", "length": "500 mm", "role": "length_standard"}
     places = [one | {"artefact": "plate"} for one in found["positions"]]
     pose = {"origin": ["300 mm", "300 mm", "300 mm"], "rotation": ["0 deg", "0 deg", "30 deg"]}
     places.append({"name": "bar", "artefact": "bar", "pose": pose, "probes": ["down"]})
+    lengths = {"kind": "distances", "pairs": "all", "standard_uncertainty": "1 um"}
     calibration = [
-        {
-            "kind": "distances",
-            "artefact": "plate",
-            "pairs": "corner sides",
-            "standard_uncertainty": "1 um",
-        },
-        {
-            "kind": "distances",
-            "artefact": "bar",
-            "pairs": "all",
-            "repeatability": repeatability,
-            "standard_uncertainty": uncertainty,
-        },
+        {**lengths, "artefact": "plate", "pairs": "corner sides"},
+        {**lengths, "artefact": "bar", "repeatability": repeatability}
+        | {"standard_uncertainty": uncertainty},
     ]
     return written(folder, *calibration, artefacts={"plate": plate, "bar": bar}, positions=places)
 

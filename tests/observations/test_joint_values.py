@@ -265,14 +265,6 @@ def test_simulated_artefacts_do_not_depend_on_the_choice_of_eigenvectors(tmp_pat
     np.testing.assert_allclose(*drawn, rtol=0, atol=1e-15)
 
 
-def test_exact_distances_are_constraints(tmp_path: Path) -> None:
-    experiment = written(tmp_path, distances(standard_uncertainty="0 um"))
-    of = problem(written(tmp_path))
-    rows_of_readings = dense.jacobian(lambda step: dense.residuals(of, step), of.parameters)
-    exact = dense.jacobian(lambda step: lengths(of, step), of.parameters)
-    agree(experiment, of, constrained(rows_of_readings, exact), 1e-9)
-
-
 def test_exact_values_leave_uncertain_ones_beside_them(tmp_path: Path) -> None:
     rows = ["ball_1,ball_2,distance_mm,standard_uncertainty_um"]
     places = {name: np.array([300.0 * (k // 3), 300.0 * (k % 3)]) for k, name in enumerate(BALLS)}
