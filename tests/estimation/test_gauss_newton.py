@@ -183,16 +183,6 @@ def test_too_few_iterations_are_a_status() -> None:
     assert len(solution.iterations) == 2
 
 
-def test_readings_are_exact_to_rounding() -> None:
-    design = design_with("distances", full=True)
-    truth = truth_of(design, errors=1e-3)
-    readings, x = exact_readings(design, truth)
-    p = design.probes.offsets[readings.probe]
-    back = x + design.model.error(x, truth.a, p)
-    true = np.einsum("mij,mj->mi", truth.rotations[readings.position], truth.balls[readings.ball])
-    np.testing.assert_allclose(back, true + truth.origins[readings.position], rtol=0, atol=5e-16)
-
-
 def test_impossible_errors_have_no_reading() -> None:
     from ballplate.simulator.readings.generate import NoReadingError
 

@@ -64,26 +64,6 @@ def test_noise_has_the_stated_size(tmp_path: Path) -> None:
     assert error[~rough].std(axis=0) == pytest.approx([2e-7] * 3, rel=0.25)
 
 
-@pytest.mark.parametrize(
-    ("stated", "line"),
-    [
-        ("[0.1 um, 0.2 um]", "has 2 axes, but the experiment has 3; give one length for all, or 3"),
-        ("0 um", "above zero"),
-        ("0.2", "has no unit"),
-    ],
-)
-def test_messages(tmp_path: Path, stated: str, line: str) -> None:
-    path = written(
-        tmp_path,
-        TEXT.replace("probes: [down]}", f"probes: [down], standard_uncertainty: {stated}}}"),
-    )
-    with pytest.raises(ExperimentError) as caught:
-        load(path)
-    paths = {message.path for message in caught.value.messages}
-    assert paths == {f"positions[{i}].standard_uncertainty" for i in (0, 1)}
-    assert line in str(caught.value)
-
-
 EXPERIMENT = small_quickstart()
 DESIGN = lay_out(EXPERIMENT)
 

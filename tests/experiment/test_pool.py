@@ -6,14 +6,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 from ballplate.results.checked_designs import check
-from ballplate.simulator.experiment.checks import excess
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import AtMost, Candidate, Experiment, Pool, Position
 from ballplate.simulator.experiment.pool import placed_only
-from ballplate.simulator.geometry.positions import ball_coordinates
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.quantities import length_text, parse_length
 from hypothesis import given
@@ -205,29 +202,6 @@ def test_two_dimensions(tmp_path: Path) -> None:
     )
     (line,) = messages(tmp_path, PLANE)
     assert line == wording.MISSING_ADD_POSITIONS
-
-
-@pytest.mark.parametrize("name", ["plate-pool", "campaign"])
-def test_what_is_there_can_be_read_and_stands_there_once(name: str) -> None:
-    (experiment,) = load(FOLDER / f"{name}.yaml", planning=True)
-    assert experiment.pool is not None
-    seen, names = set(), set()
-    for one in experiment.pool.candidates:
-        assert one.name not in names
-        names.add(one.name)
-        if not isinstance(one.item, Position):
-            continue
-        balls = ball_coordinates(one.item.pose, experiment.layouts[one.item.artefact])
-        for group in one.item.readings:
-            assert excess(balls[group.ball_indices], experiment.machine.volume)[0].max() < 1e-9
-        # The set of balls with their places and probes tells positions apart.
-        key = (
-            one.item.artefact,
-            np.rint(balls * 1e6).tobytes(),
-            frozenset(one.item.readings[0].probes),
-        )
-        assert key not in seen
-        seen.add(key)
 
 
 def test_candidates_of_a_large_pool_are_counted() -> None:

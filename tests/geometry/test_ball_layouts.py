@@ -65,17 +65,6 @@ def test_two_spheres() -> None:
         np.testing.assert_array_equal(pairs(bar, name), [[0, 1]])
 
 
-def test_listed_balls() -> None:
-    numbered = layout(kind="balls", coordinates=(("1 mm", "2 mm"), ("3 mm", "4 mm", "5 mm")))
-    assert numbered.names == ("1", "2")
-    np.testing.assert_array_equal(
-        numbered.coordinates, [[0.001, 0.002, 0.0], [0.003, 0.004, 0.005]]
-    )
-    by_name = layout(kind="balls", coordinates={"a": ("1 mm", "2 mm")})
-    assert by_name.names == ("a",)
-    assert len(pairs(by_name, "all")) == 0
-
-
 def test_sets_that_are_not_defined() -> None:
     balls = layout(kind="balls", coordinates=(("0 mm", "0 mm"), ("1 mm", "0 mm")))
     with pytest.raises(ValueError, match=wording.IS_NOT_DEFINED_CHOOSE):

@@ -382,15 +382,6 @@ def test_a_fit_meets_exact_values_and_minimises_the_rest(tmp_path: Path) -> None
     np.testing.assert_allclose(lengths(of, at), want, rtol=0, atol=1e-15)
 
 
-def test_errors_have_the_covariance(correlated: tuple[Experiment, Real]) -> None:
-    experiment, covariance = correlated
-    given = lay_out(experiment).of(JointValues)
-    drawn = given.errors(np.random.default_rng(1), 200_000)
-    found = np.cov(drawn.T)
-    scale = np.sqrt(np.outer(np.diag(covariance), np.diag(covariance)))
-    assert np.abs((found - covariance) / scale).max() < 5.0 * np.sqrt(2.0 / 200_000)
-
-
 @pytest.mark.parametrize("kind", ["correlated", "singular"])
 def test_replicates_scatter_by_the_uncertainty(
     correlated: tuple[Experiment, Real], tmp_path: Path, kind: str
