@@ -205,31 +205,6 @@ def test_the_fit_is_the_one_of_scipy(variant: str, tmp_path: Path) -> None:
     assert found.solution.factor.sum_of_squares == pytest.approx(2.0 * theirs.cost, rel=1e-6)
 
 
-def test_an_unknown_radius_is_one_that_is_known_badly(tmp_path: Path) -> None:
-    observed = FOLDER / "bryan-gauge-readings.csv"
-    unknown = shipped("bryan-gauge", "radius unknown")
-    badly = changed(
-        tmp_path,
-        "bryan-gauge",
-        calibration=[{"kind": "radius", "standard_uncertainty": "20 um"}],
-        seed=151,
-    )
-    found = [fit(one, read_readings(observed, lay_out(one)), "given") for one in (unknown, badly)]
-    assert [one.verdict.deficiency for one in found] == [1, 0]
-    left = {one.name: one for one in found[0].adjustments}
-    assert np.isnan(left["scale x"].value) and left["scale x"].words == "cannot be determined"
-    right = {e.name: e for e in found[1].estimates}
-    assert right["scale x"].standard_uncertainty == pytest.approx(20e-6 / 0.3, rel=1e-2)
-    for name, angle in (("C0Y", "angle xy"), ("B0Z", "angle xz"), ("A0Z", "angle yz")):
-        excess = -1.0 if name == "B0Z" else 1.0
-        assert excess * left[angle].value == pytest.approx(right[name].value, abs=1e-9)
-        assert left[angle].standard_uncertainty == pytest.approx(
-            right[name].standard_uncertainty, rel=1e-4
-        )
-    difference = right["scale y"].value - right["scale x"].value
-    assert left["scale y - scale x"].value == pytest.approx(difference, abs=1e-9)
-
-
 def test_where_the_ball_was_to_be_does_not_matter(tmp_path: Path) -> None:
     """Readings of other directions than drawn, of a pivot that stands elsewhere, fit just as
     well.

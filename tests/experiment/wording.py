@@ -36,7 +36,6 @@ HAS_NO_UNIT = (
 )
 HAS_NO_UNIT_WRITE = '"5e-6" has no unit; write "5e-6 m/m" if it is in m/m'
 HAS_THE_UNKNOWN_UNIT = 'e.yaml:2:51: machine.repeatability: "1 mu" has the unknown unit "mu"'
-HAVE_BALLS_IN_COMMON = "have balls in common; at most 2 such"
 IS_NOT_A = 'd.csv:2:11: "five" is not a number; write for example "500.0003"'
 IS_PART_OF_THE_SAME_2 = "e.yaml:12:5: variants.A[positions[0].level]: overlaps the path"
 IS_PART_OF_THE_SAME_PLACE = "e.yaml:15:5: variants.B[positions[0].level]: overlaps the path"

@@ -4,7 +4,6 @@ balls that it names.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,6 @@ import pytest
 import yaml
 from ballplate import experiment
 from ballplate.simulator.experiment.layout import lay_out
-from scipy.optimize import least_squares
 
 from tests.geometry import wording
 from tests.reference import dense
@@ -132,25 +130,6 @@ def test_uncertainties_are_those_of_a_dense_computation(
         assert found[symbol]["average"] == pytest.approx(expected[symbol].mean(), rel=1e-7)
     deficiency = dense.linearised(problem).deficiency
     assert told["check"]["rank_deficiency"] == told["run"]["rank_deficiency"] == deficiency
-
-
-def test_a_fit_minimises_the_sum_of_squares(told: dict[str, Any], problem: dense.Problem) -> None:
-    of = replace(problem, scales=np.array(told["x"]))
-    solution = least_squares(
-        lambda at: dense.residuals(of, at),
-        np.zeros(of.parameters),
-        lambda at: dense.jacobian(lambda step: dense.residuals(of, at + step), of.parameters),
-        x_scale="jac",
-        xtol=1e-15,
-        ftol=1e-15,
-    )
-    assert told["fit"]["status"] == "converged"
-    assert told["S^2"] == pytest.approx(2.0 * solution.cost, rel=1e-8)
-    # By nothing that counts beside their uncertainties.
-    away = np.abs(np.array(told["balls"]) - dense.unpack(of, solution.x)[0])
-    assert (
-        away.ravel() < 1e-3 * dense.standard_uncertainties(of, symbols=["U1"])["U1"].ravel()
-    ).all()
 
 
 def test_estimators_of_distances_take_its_pairs(told: dict[str, Any]) -> None:

@@ -37,8 +37,7 @@ CORNER = {
     "balls": ["r1c3", "r1c1", "r3c1"],
     "standard_uncertainty": "0.05 arcsec",
 }
-# Indices of the balls of the angle, its vertex in the middle, and 0.05 arcsec in radians.
-LEGS, ANGLE_UNCERTAINTY = (2, 0, 6), 0.05 * np.pi / 180 / 3600
+ANGLE_UNCERTAINTY = 0.05 * np.pi / 180 / 3600
 ONE_HEIGHT = HEIGHTS | {"values": ["0 mm"], "balls": ["r2c3"]}
 REFUSED = {
     "collinear plane": ONE_HEIGHT | {"plane": ["r1c1", "r1c2", "r1c3"]},
@@ -253,18 +252,6 @@ def test_files_hold_its_values(told: dict[str, Any]) -> None:
     assert json.loads(told["fit"])["status"] == "converged"
 
 
-def corner_rows(of: dense.Problem, uncertainty: float) -> dense.Values:
-    """Slopes of all observations, last that of the angle, which is right: its cosine's."""
-
-    def rows(step: dense.Values) -> dense.Values:
-        balls = dense.unpack(of, step)[0]
-        one, other = (balls[k] - balls[LEGS[1]] for k in (LEGS[0], LEGS[2]))
-        cosine = (one * other).sum() / np.sqrt((one * one).sum() * (other * other).sum())
-        return np.concatenate([dense.residuals(of, step), [-cosine / uncertainty]])
-
-    return dense.jacobian(rows, of.parameters)
-
-
 def test_certificates_have_the_unit_of_the_kind(told: dict[str, Any]) -> None:
     (line,) = [one for one in told["angle certificate"].splitlines() if "calibration[1]" in one]
     item, ball, what, value = line.split(",")
@@ -275,19 +262,10 @@ def test_certificates_have_the_unit_of_the_kind(told: dict[str, Any]) -> None:
 
 
 def test_reliability_has_the_unit_of_the_kind(told: dict[str, Any]) -> None:
-    of = drawn()
-    whole = corner_rows(of, ANGLE_UNCERTAINTY)
-    taken = (np.linalg.qr(whole / np.linalg.norm(whole, axis=0))[0][-1] ** 2).sum()
-    (one,) = [
-        one for one in told["angle reliability"]["observations_by_name"] if one["kind"] == "angle"
-    ]
-    assert one["unit"] == "rad" and one["redundancy"] == pytest.approx(1.0 - taken, rel=1e-6)
-    limit = norm.isf(0.0005) + norm.isf(0.2)
-    detectable = limit * ANGLE_UNCERTAINTY / np.sqrt(1.0 - taken)
-    assert one["minimal_detectable"] == pytest.approx(detectable, rel=1e-4)
-    (line,) = [
-        one for one in told["angle reliability table"] if one.startswith("angle at ball r1c1")
-    ]
+    found = told["angle reliability"]["observations_by_name"]
+    assert [one["unit"] for one in found if one["kind"] == "angle"] == ["rad"]
+    table = told["angle reliability table"]
+    (line,) = [one for one in table if one.startswith("angle at ball r1c1")]
     assert "µrad" in line
 
 
