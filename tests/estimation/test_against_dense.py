@@ -56,11 +56,6 @@ def grid_of_four() -> Design:
     return plate_design(balls, six_positions(), corner_sides(balls))
 
 
-def grid_of_five() -> Design:
-    balls = grid(5)
-    return plate_design(balls, six_positions(), corner_sides(balls))
-
-
 def certified_coordinates() -> Design:
     """Experiment 6.1.1 C: all co-ordinates calibrated, all poses free."""
     balls = grid(5)
@@ -95,7 +90,8 @@ def some_balls_only() -> Design:
     """The second and the last position read but a part of the balls, one ball there with one tip
     only.
     """
-    design = grid_of_five()
+    balls = grid(5)
+    design = plate_design(balls, six_positions(), corner_sides(balls))
     readings = design.readings
     missing = (readings.position == 1) & (readings.ball % 3 == 0)
     missing |= (readings.position == 5) & (readings.ball > 14)

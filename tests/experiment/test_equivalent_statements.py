@@ -204,10 +204,6 @@ PAIRS: dict[str, Pair] = {
             ],
         },
     ),
-    "repeats in groups": Pair(
-        {f"{Z}.repeats": 2},
-        {f"{Z}.probes": None, f"{Z}.readings": [{"probes": ["down"]}, {"probes": ["down"]}]},
-    ),
     "repeats of a group": Pair(
         {f"{Z}.repeats": 3, f"{Z}.standard_uncertainty": "0.5 um"},
         {
@@ -231,10 +227,6 @@ PAIRS: dict[str, Pair] = {
     ),
     # Calibration.
     "sides by name": Pair({}, {DISTANCES + ".pairs": SIDES}),
-    "corners by name": Pair(
-        {DISTANCES + ".pairs": "corners"},
-        {DISTANCES + ".pairs": [*SIDES, ["r1c1", "r3c3"], ["r1c3", "r3c1"]]},
-    ),
     "co-ordinates with U": Pair(
         {DISTANCES: UNCERTAIN | {"standard_uncertainty": "0.5 um"}},
         {DISTANCES: {"kind": "coordinates", "values": "balls.csv", "coverage_factor": 2}},

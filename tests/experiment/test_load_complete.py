@@ -239,15 +239,6 @@ def test_coordinates(complete: Experiment) -> None:
     np.testing.assert_array_equal(two.standard_uncertainties, [2e-7, 3e-7])
 
 
-def test_evaluation_points_are_inside_and_repeatable(complete: Experiment, tmp_path: Path) -> None:
-    assert complete.evaluation.points.shape == (200, 3)
-    assert complete.evaluation.probe == "side"
-    assert np.all(complete.evaluation.points >= complete.machine.volume.lower)
-    assert np.all(complete.evaluation.points <= complete.machine.volume.upper)
-    again = experiment_of(tmp_path, COMPLETE)
-    np.testing.assert_array_equal(again.evaluation.points, complete.evaluation.points)
-
-
 def test_evaluation_points_of_a_file(tmp_path: Path) -> None:
     (tmp_path / "points.csv").write_text("z_mm,x_mm,y_mm\n3,1,2\n")
     text = COMPLETE.replace("{random: 200, seed: 1}", "{file: points.csv}")

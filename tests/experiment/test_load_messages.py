@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from ballplate.simulator.experiment.loading import load
-from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.inputs.messages import ExperimentError
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -374,13 +374,6 @@ def test_points_of_a_table_outside_the_volume(tmp_path: Path) -> None:
 def test_files_that_are_no_mapping(tmp_path: Path, text: str) -> None:
     (line,) = refusals(tmp_path, text)
     assert line.startswith(wording.EXPECTED_A_MAPPING_THAT_BEGINS)
-
-
-def test_messages_are_data() -> None:
-    message = Message("e.yaml", 3, 5, "machine", "wrong; do right")
-    error = ExperimentError([message, Message("e.yaml", 0, 0, "", "gone; look for it")])
-    assert str(error) == "e.yaml:3:5: machine: wrong; do right\ne.yaml: gone; look for it"
-    assert error.messages[0] == message
 
 
 FRAGMENTS = ["5", "x", "[]", "{}", "[[1 mm]]", "{x: 1 mm}", "~", "true", "-1 mm", ".nan", "[a, {b: 1}]",

@@ -344,14 +344,6 @@ def test_a_table_that_is_too_long(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert line.startswith(wording.POINTS_ARE_TOO_MANY)
 
 
-def test_a_table_from_zero_on_an_axis_that_begins_elsewhere(tmp_path: Path) -> None:
-    lines = told(written(tmp_path, table="position_mm,EYX_um\n0,0\n50,1\n1900,0\n"))
-    assert [line.partition(",")[0] for line in lines] == [
-        wording.THE_TABLE_BEGINS_AT_MM,
-        wording.THE_TABLE_ENDS_AT_MM,
-    ]
-
-
 EXPERIMENT = """\
 title: a machine file
 machine: {volume: {x: [0 mm, 1 m], y: [0 mm, 1 m], z: [0 mm, 1 m]}, repeatability: 1 um}

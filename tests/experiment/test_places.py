@@ -233,6 +233,8 @@ def test_candidates_of_a_pool_are_at_the_places_of_positions(limits: str, tmp_pa
         settings = to_list(candidate.settings)
         written = loaded(tmp_path, json.dumps(settings), limits and f"pool:\n{limits}")
         assert not placed(written).parts
+        (kept,), (stated_ones,) = placed(written).readings, item.readings
+        assert (kept.probes, kept.balls) == (stated_ones.probes, stated_ones.balls)
         np.testing.assert_allclose(placed(written).pose.origin, item.pose.origin, atol=1e-12)
         # The same place as a position states it, with the words of the candidate's name.
         if candidate.group != "whole":

@@ -165,32 +165,6 @@ def test_times(tmp_path: Path) -> None:
     )
 
 
-def test_settings_of_candidates_are_those_of_a_file(tmp_path: Path) -> None:
-    pool = named(
-        pool_of(
-            tmp_path,
-            replaced(SOME_PROBES, f"{SOME_PROBES}\n      quarter_turns: [1]\n      balls: corners"),
-        )
-    )
-    assert pool["some z 600 mm at 0, 400 mm"].settings == {
-        "name": "some z 600 mm at 0, 400 mm",
-        "artefact": "plate",
-        "plane": "z",
-        "level": "600 mm",
-        "corner": {"x": "0 mm", "y": "400 mm"},
-        "quarter_turns": 1,
-        "probes": ["down"],
-        "balls": ["r1c1", "r1c3", "r3c1", "r3c3"],
-    }
-    assert pool["dear"].settings == {
-        "kind": "distances",
-        "artefact": "plate",
-        "pairs": "corners",
-        "standard_uncertainty": "0.1 um",
-    }
-    assert "times" not in pool["bar"].settings
-
-
 def test_two_dimensions(tmp_path: Path) -> None:
     experiment = experiment_of(tmp_path, PLANE)
     assert experiment.positions == () and experiment.pool is not None
@@ -279,12 +253,6 @@ def test_a_range_has_its_ends_and_numbers_one_would_write(tmp_path: Path) -> Non
     )
     levels = sorted({one.settings["level"] for one in pool.candidates if one.group == "some"})
     assert levels == ["25.4 mm", "250.266666667 mm", "475.133333333 mm", "700 mm"]
-    for one in pool.candidates:
-        if one.group == "some":
-            assert isinstance(one.item, Position)
-            assert one.item.pose.origin["xyz".index(one.plane)] == parse_length(
-                one.settings["level"]
-            )
 
 
 def test_without_planning_what_only_the_pool_places_is_left_out(tmp_path: Path) -> None:

@@ -75,8 +75,6 @@ THE_DISTANCE_OF_AND_IS_GIVEN = (
     'd.csv:4:1: calibration[0].values: the distance of "r1c3" and "r1c1" is given twice; '
     "remove one of the two"
 )
-THE_TABLE_BEGINS_AT_MM = "eyx.csv:2:1: the table begins at 0 mm"
-THE_TABLE_ENDS_AT_MM = "eyx.csv:4:1: the table ends at 1900 mm"
 YAML_STATES_NO_ERROR_THAT_COULD = (
     "e.yaml:3:36: error_model.file: m.yaml states no error that could be"
 )

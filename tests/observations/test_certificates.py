@@ -431,10 +431,6 @@ WRONG_CERTIFICATES = {
         of_list(covariance=dcc.region(MATRIX, "\\micro\\metre")),
         "is not a unit of the square of a length",
     ),
-    "far from the drawing": (
-        SPACED.replace("\\milli\\metre", "\\centi\\metre"),
-        "far from",
-    ),
 }
 
 

@@ -48,37 +48,15 @@ REFUSED = {
 }
 
 SCRIPT = """
-import contextlib, io, json, sys
-from pathlib import Path
-
-import ballplate as bp
-from ballplate.cli import main
-from ballplate.simulator.inputs.messages import ExperimentError
-
-def said(*arguments):
-    stream = io.StringIO()
-    with contextlib.redirect_stdout(stream), contextlib.redirect_stderr(stream):
-        try:
-            main(list(arguments))
-        except SystemExit:
-            pass
-    return stream.getvalue()
-
-folder = Path(sys.argv[1])
 base, readings, certificate = (str(folder / name) for name in ("base.yaml", "r.csv", "c.csv"))
 start = bp.load(base)
 said("simulate", base, "-o", readings, "--certificate", certificate, "--seed", "2")
 fitted = bp.fit(start, bp.simulate(start, seed=5))
 given = fitted.design.readings
-try:
-    bp.load(folder / "wrong.yaml")
-    refused = ""
-except ExperimentError as error:
-    refused = str(error)
 def refusal(name):
     try:
         bp.load(folder / f"{name}.yaml")
-    except ExperimentError as error:
+    except bp.ExperimentError as error:
         return str(error)
     return ""
 
@@ -98,9 +76,9 @@ print(json.dumps({
     "S^2": fitted.solution.factor.sum_of_squares,
     "status": fitted.solution.status,
     "certificate": Path(certificate).read_text(),
-    "fit": said("fit", base, readings, "--certificate", certificate, "--json"),
-    "schema": json.loads(said("schema")),
-    "refused": refused,
+    "fit": said("fit", base, readings, "--certificate", certificate, "--json")[1],
+    "schema": json.loads(said("schema")[1]),
+    "refused": refusal("wrong"),
     "refusals": {name: refusal(name) for name in sys.argv[2:]},
     "angle certificate": Path(angle_certificate).read_text(),
     "angle reliability": angular.to_dict(),
