@@ -62,27 +62,12 @@ def certified_coordinates() -> Design:
     return plate_design(balls, four_positions(), coordinates=range(len(balls)))
 
 
-def neighbour_distances() -> Design:
-    """Experiment 6.1.1 A."""
-    balls = grid(5)
-    return plate_design(balls, four_positions(), neighbours(balls))
-
-
 def unequal_axes() -> Design:
     """A repeatability of its own for each axis, and a volume that is no unit cube."""
     balls = grid(4)
     sigmas, lower, upper = (1e-7, 3e-7, 7e-7), (-0.1, 0.0, -0.2), (1.2, 1.05, 1.0)
     return plate_design(
         balls, six_positions(), corner_sides(balls), repeatability=sigmas, lower=lower, upper=upper
-    )
-
-
-def repeats() -> Design:
-    """Each reading taken once to four times."""
-    design = grid_of_four()
-    readings = design.readings
-    return replace(
-        design, readings=replace(readings, repeats=1 + (np.arange(len(readings)) * 5) % 4)
     )
 
 
@@ -271,9 +256,7 @@ def compare(design: Design, state: State, problem: dense.Problem, x: Real | None
     "make",
     [
         certified_coordinates,
-        neighbour_distances,
         unequal_axes,
-        repeats,
         some_balls_only,
         planar_distances,
         two_artefacts,

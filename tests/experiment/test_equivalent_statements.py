@@ -104,7 +104,6 @@ def priors(*items: tuple[str, str]) -> Changes:
 
 
 SENSOR = {"value": "20.8 degC", "standard_uncertainty": "50 mK", "sensor_uncertainty": "200 mK"}
-WARM = {"artefact_expansion": {"value": "11.5 um/m/K", "standard_uncertainty": "0.6 um/m/K"}}
 OFFSET_OF_LEFT = ["-50 mm", "0 mm", "0 mm"]
 SPLINE = {"order": 3, "knots": []}
 STAR = {"probes": ["right", "left", "back"], "standard_uncertainty": "0.5 um", "place": "unknown"}
@@ -337,14 +336,6 @@ PAIRS: dict[str, Pair] = {
             f"{Z}.level": "0.25 m",
             DISTANCES + ".standard_uncertainty": "0.0002 mm",
         },
-    ),
-    "temperatures in other units": Pair(
-        temperature(**WARM, artefact_temperature=SENSOR),
-        temperature(
-            artefact_expansion={"value": "11.5 ppm/K", "standard_uncertainty": "0.6 um/m/degC"},
-            artefact_temperature=SENSOR
-            | {"standard_uncertainty": "0.05 K", "sensor_uncertainty": "0.2 K"},
-        ),
     ),
     "uncertainty of one length": Pair(
         {DISTANCES + ".standard_uncertainty": "0.1 um + 1 ppm"},

@@ -85,12 +85,6 @@ def test_formatted_lengths_are_read_again(length: float) -> None:
     assert typed_length(length).isascii()
 
 
-@given(st.floats(1e-9, 1e-3), st.floats(1.00001e4, 1e9))
-def test_length_functions_are_read_again(constant: float, divisor: float) -> None:
-    function = parse_length_function(f"{constant!r} m + L/{divisor!r}")
-    assert function == LengthFunction(constant, float(1 / Fraction(repr(divisor))))
-
-
 @given(st.text(max_size=30))
 @settings(max_examples=40)
 def test_no_text_breaks_the_parsers(text: str) -> None:

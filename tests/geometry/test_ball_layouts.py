@@ -57,14 +57,6 @@ def test_square_has_only_its_outline(per_side: int) -> None:
     assert len(corners(square)) == 4
 
 
-def test_two_spheres() -> None:
-    bar = layout(kind="two_spheres", length="500 mm", role="length_standard")
-    assert bar.names == ("1", "2")
-    np.testing.assert_array_equal(bar.coordinates, [[0.0, 0.0, 0.0], [0.5, 0.0, 0.0]])
-    for name in ("corner sides", "neighbours", "all"):
-        np.testing.assert_array_equal(pairs(bar, name), [[0, 1]])
-
-
 def test_sets_that_are_not_defined() -> None:
     balls = layout(kind="balls", coordinates=(("0 mm", "0 mm"), ("1 mm", "0 mm")))
     with pytest.raises(ValueError, match=wording.IS_NOT_DEFINED_CHOOSE):
