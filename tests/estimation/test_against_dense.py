@@ -71,6 +71,15 @@ def unequal_axes() -> Design:
     )
 
 
+def repeats() -> Design:
+    """Each reading taken once to four times."""
+    design = grid_of_four()
+    readings = design.readings
+    return replace(
+        design, readings=replace(readings, repeats=1 + (np.arange(len(readings)) * 5) % 4)
+    )
+
+
 def some_balls_only() -> Design:
     """The second and the last position read but a part of the balls, one ball there with one tip
     only.
@@ -257,6 +266,7 @@ def compare(design: Design, state: State, problem: dense.Problem, x: Real | None
     [
         certified_coordinates,
         unequal_axes,
+        repeats,
         some_balls_only,
         planar_distances,
         two_artefacts,
