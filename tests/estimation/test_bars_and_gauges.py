@@ -18,7 +18,6 @@ from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.gauss_newton import moved
 from ballplate.simulator.estimation.length_equations import LengthEstimator, length_estimate
 from ballplate.simulator.estimation.linearisation import linearise
-from ballplate.simulator.estimation.spheres import fit_sphere
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
@@ -206,31 +205,6 @@ def test_the_fit_is_the_one_of_scipy(variant: str, tmp_path: Path) -> None:
     assert found.solution.factor.sum_of_squares == pytest.approx(2.0 * theirs.cost, rel=1e-6)
 
 
-def test_an_unknown_radius_is_one_that_is_known_badly(tmp_path: Path) -> None:
-    observed = FOLDER / "bryan-gauge-readings.csv"
-    unknown = shipped("bryan-gauge", "radius unknown")
-    badly = changed(
-        tmp_path,
-        "bryan-gauge",
-        calibration=[{"kind": "radius", "standard_uncertainty": "20 um"}],
-        seed=151,
-    )
-    found = [fit(one, read_readings(observed, lay_out(one)), "given") for one in (unknown, badly)]
-    assert [one.verdict.deficiency for one in found] == [1, 0]
-    left = {one.name: one for one in found[0].adjustments}
-    assert np.isnan(left["scale x"].value) and left["scale x"].words == "cannot be determined"
-    right = {e.name: e for e in found[1].estimates}
-    assert right["scale x"].standard_uncertainty == pytest.approx(20e-6 / 0.3, rel=1e-2)
-    for name, angle in (("C0Y", "angle xy"), ("B0Z", "angle xz"), ("A0Z", "angle yz")):
-        excess = -1.0 if name == "B0Z" else 1.0
-        assert excess * left[angle].value == pytest.approx(right[name].value, abs=1e-9)
-        assert left[angle].standard_uncertainty == pytest.approx(
-            right[name].standard_uncertainty, rel=1e-4
-        )
-    difference = right["scale y"].value - right["scale x"].value
-    assert left["scale y - scale x"].value == pytest.approx(difference, abs=1e-9)
-
-
 def test_where_the_ball_was_to_be_does_not_matter(tmp_path: Path) -> None:
     """Readings of other directions than drawn, of a pivot that stands elsewhere, fit just as
     well.
@@ -295,22 +269,6 @@ def test_each_repeat_of_a_gauge_is_a_length_of_its_own(tmp_path: Path) -> None:
     assert (
         len(observed.design.of(Lengths)) == 120
         and len(np.unique(observed.design.of(Lengths).first)) == 120
-    )
-
-
-def test_a_sphere_through_points(tmp_path: Path) -> None:
-    generator = np.random.default_rng(3)
-    directions = generator.standard_normal((20, 3))
-    directions /= np.linalg.norm(directions, axis=1)[:, None]
-    centre, radius = fit_sphere([1.0, 2.0, 3.0] + 0.25 * directions, np.zeros(3))
-    np.testing.assert_allclose(centre, [1.0, 2.0, 3.0], rtol=0, atol=1e-14)
-    assert radius == pytest.approx(0.25, abs=1e-14)
-    flat = np.array([1.0, 2.0, 3.0]) + 0.25 * np.column_stack(
-        [np.cos(range(9)), np.sin(range(9)), np.zeros(9)]
-    )
-    # Points on a circle leave the height of the centre as it is.
-    np.testing.assert_allclose(
-        fit_sphere(flat, np.array([0.0, 0.0, 2.9]))[0], [1.0, 2.0, 2.9], atol=1e-14
     )
 
 

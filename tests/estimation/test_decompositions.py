@@ -12,8 +12,6 @@ import numpy as np
 import pytest
 from ballplate.simulator.computing import decompositions
 
-from tests.robustness.kit import make_kit
-
 NAMES = ("svd", "eigh", "eigvalsh", "lstsq", "pinv")
 GENERATOR = np.random.default_rng(5)
 WIDE, SQUARE = GENERATOR.standard_normal((4, 7)), GENERATOR.standard_normal((5, 5))
@@ -108,10 +106,3 @@ def test_no_module_uses_the_first_routine_alone() -> None:
                 assert len(node.args) == 1, (path, node.lineno)
             assert not isinstance(node, ast.ImportFrom) or node.module != "numpy.linalg", path
     assert found <= allowed
-
-
-@pytest.fixture(scope="module")
-def kit(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("kit")
-    make_kit(folder)
-    return folder

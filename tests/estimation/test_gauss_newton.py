@@ -183,29 +183,6 @@ def test_too_few_iterations_are_a_status() -> None:
     assert len(solution.iterations) == 2
 
 
-def test_readings_are_exact_to_rounding() -> None:
-    design = design_with("distances", full=True)
-    truth = truth_of(design, errors=1e-3)
-    readings, x = exact_readings(design, truth)
-    p = design.probes.offsets[readings.probe]
-    back = x + design.model.error(x, truth.a, p)
-    true = np.einsum("mij,mj->mi", truth.rotations[readings.position], truth.balls[readings.ball])
-    np.testing.assert_allclose(back, true + truth.origins[readings.position], rtol=0, atol=5e-16)
-
-
-def test_noise_has_the_stated_size_and_seed() -> None:
-    design = altered(
-        design_with("distances"), machine={"repeatability": np.array([1e-7, 2e-7, 4e-7])}
-    )
-    truth = truth_of(design)
-    _, exact = exact_readings(design, truth)
-    _, x = noisy_readings(design, truth, np.random.default_rng(8))
-    _, again = noisy_readings(design, truth, np.random.default_rng(8))
-    np.testing.assert_array_equal(x, again)
-    spread = (x - exact).std(axis=0) / design.machine.repeatability
-    assert np.all(np.abs(spread - 1) < 4 / np.sqrt(2 * len(x)))
-
-
 def test_impossible_errors_have_no_reading() -> None:
     from ballplate.simulator.readings.generate import NoReadingError
 

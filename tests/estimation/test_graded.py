@@ -69,19 +69,6 @@ def test_a_triangle_keeps_what_the_lightest_rows_tell(order: str, size: float) -
     np.testing.assert_array_equal(found.rows[:, found.order], found.root)
 
 
-@pytest.mark.parametrize(("rows", "columns", "sides"), [(2, 4, 3), (3, 0, 2), (5, 3, 0), (0, 2, 1)])
-def test_a_triangle_of_few_rows_or_columns(rows: int, columns: int, sides: int) -> None:
-    """The products of all columns stay what they are."""
-    generator = np.random.default_rng(1)
-    given, beside = generator.standard_normal((rows, columns)), np.ones((rows, sides))
-    found = triangle(given, beside)
-    assert found.root.shape == (columns, columns) and found.side.shape == (columns, sides)
-    np.testing.assert_allclose(found.rows.T @ found.rows, given.T @ given, atol=1e-14)
-    np.testing.assert_allclose(found.rows.T @ found.side, given.T @ beside, atol=1e-14)
-    whole = found.side.T @ found.side + found.rest.T @ found.rest
-    np.testing.assert_allclose(whole, beside.T @ beside, atol=1e-14)
-
-
 def test_rows_that_are_collected_give_the_triangle_of_all() -> None:
     generator = np.random.default_rng(2)
     parts = [generator.standard_normal((200, 5)) for _ in range(6)]
@@ -123,10 +110,3 @@ def test_balls_are_eliminated_with_all_digits_of_the_lightest_rows(size: float) 
         np.testing.assert_allclose(ours, solution, rtol=1e-11)
         np.testing.assert_allclose(left[ball].T @ left[ball], products, rtol=1e-11)
         assert (np.tril(root[ball], -1) == 0.0).all() and sorted(order[ball]) == [0, 1, 2]
-
-
-def test_rows_without_a_ball_stay_as_they_are() -> None:
-    by_ball, rest = np.zeros((1, 4, 2)), np.arange(8.0).reshape(1, 4, 2)
-    root, _, top, left = without_balls(by_ball, rest.copy(), np.ones((1, 4)))
-    assert not root.any()
-    np.testing.assert_array_equal(np.concatenate([top, left], axis=1), rest)

@@ -117,13 +117,6 @@ def test_scatter_is_that_of_the_readings_at_any_angle(beta: float) -> None:
     assert min(one.single for one in found) > (1e-3 if abs(beta) > 0.1 else 1e-8)
 
 
-def test_a_single_reading_scatters_by_sigma_over_the_root_of_two() -> None:
-    first, second = readings(1e-5)
-    noise = np.random.default_rng(1).normal(0.0, 1e-6, (500, 2, *PLATE.shape))
-    found = [reverse(first + a, second + b, "x").single for a, b in noise]
-    assert np.sqrt(np.mean(np.square(found))) == pytest.approx(1e-6, rel=4 / np.sqrt(2 * 9 * 500))
-
-
 def test_few_balls_and_balls_on_a_line() -> None:
     first, second = readings(1e-5)
     for chosen in ([0], [0, 1], [1, 1]):

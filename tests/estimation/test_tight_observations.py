@@ -225,7 +225,7 @@ def assert_never_lower(what: tuple[list[int], str, float], more: list[Known]) ->
 
 
 def exact_uncertainties(design: Design) -> dict[str, Real]:
-    """U1 to U6 from normal equations in `DIGITS` digits; what is undetermined is held, which
+    """U1 to U4 from normal equations in `DIGITS` digits; what is undetermined is held, which
     changes nothing else.
     """
     problem, rows, stated = unweighted(design)
@@ -237,6 +237,8 @@ def exact_uncertainties(design: Design) -> dict[str, Real]:
     root = _cholesky(whole.T @ whole)
     found = {}
     for symbol, function in dense.quantities(problem).items():
+        if symbol in ("U5", "U6"):
+            continue
         linear = dense.jacobian(function, problem.parameters)
         change = np.abs(linear @ open_).max(axis=1, initial=0.0)
         values = _solved(root, _exact(linear.T))

@@ -174,25 +174,12 @@ def with_standard(balls: str) -> str:
 
 
 def test_a_length_standard_of_too_many_lengths(tmp_path: Path) -> None:
+    """Three thousand with balls in common are possible; others are no difficulty."""
     assert refusals(tmp_path, with_standard("[20, 20]")) == [wording.DISTANCES_OF_READ_TIMES]
-
-
-def test_a_length_standard_of_too_many_lengths_between_the_same_balls(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Three thousand are possible; as many between balls of their own are no difficulty."""
     text = with_standard("[10, 8]")
     assert refusals(tmp_path, text) == [wording.DISTANCES_OF_HAVE_BALLS_IN_COMMON]
     (tmp_path / "e.yaml").write_text(text.replace("[10, 8]", "[11, 7]"))
     assert len(load(tmp_path / "e.yaml")[0].calibration[0].values) == 2926
-    monkeypatch.setattr("ballplate.simulator.experiment.checks.MOST_JOINT_LENGTHS", 2)
-    text = text.replace("[10, 8]", "[2, 3]")
-    (tmp_path / "e.yaml").write_text(
-        text.replace("pairs: all", "pairs: [[r1c1, r1c2], [r2c1, r2c2], [r3c1, r3c2]]")
-    )
-    assert len(load(tmp_path / "e.yaml")[0].calibration[0].values) == 3
-    joint = text.replace("pairs: all", "pairs: [[r1c1, r1c2], [r1c2, r2c2], [r3c1, r3c2]]")
-    assert wording.HAVE_BALLS_IN_COMMON in refusals(tmp_path, joint)[0]
 
 
 def test_more_points_than_there_is_memory_for_with_so_many_errors(tmp_path: Path) -> None:
@@ -213,33 +200,20 @@ def test_more_points_than_there_is_memory_for_with_so_many_errors(tmp_path: Path
     assert len(load(tmp_path / "e.yaml")[0].evaluation.points) == most
 
 
-@pytest.mark.parametrize("size", ["1e7 m", "1e300 m", "1e-19 m", "1e-300 um"])
-def test_lengths_that_nothing_has(tmp_path: Path, size: str) -> None:
-    (line,) = refusals(tmp_path, replaced("0.2 um}\nerror", f"{size}}}\nerror"))
-    assert line.endswith(wording.IS_BEYOND_WHAT_CAN_BE_COMPUTED)
-
-
-def test_the_slope_of_an_uncertainty_that_nothing_has(tmp_path: Path) -> None:
-    (line,) = refusals(tmp_path, f"{GOOD}target_uncertainty: 0.2 um + L/1e-3\n")
-    assert wording.GROWS_BY_PER_METRE_OF_LENGTH in line
-    (line,) = refusals(tmp_path, f"{GOOD}target_uncertainty: 0.2 um + L/1e19\n")
-    assert line.endswith(wording.GROWS_TOO_SLOWLY)
-
-
 def test_no_more_than_a_thousand_errors(tmp_path: Path) -> None:
-    lines = refusals(tmp_path, replaced("balls: [3, 3]", f"balls: [{', '.join(['a'] * 60_000)}]"))
+    lines = refusals(tmp_path, replaced("balls: [3, 3]", f"balls: [{', '.join(['a'] * 20_000)}]"))
     assert len(lines) <= 2 * MOST_MESSAGES
-    balls = f"corner: {{x: 0 mm, y: 0 mm}}, balls: [{', '.join(f'b{k}' for k in range(60_000))}]}}"
+    balls = f"corner: {{x: 0 mm, y: 0 mm}}, balls: [{', '.join(f'b{k}' for k in range(20_000))}]}}"
     lines = refusals(tmp_path, replaced("corner: {x: 0 mm, y: 0 mm}}", balls))
     assert len(lines) == MOST_MESSAGES + 1 and lines[-1].endswith(wording.MORE_THAN_ERRORS_MEND)
-    lines = refusals(tmp_path, "a: [" + "~, " * 60_000 + "]")
+    lines = refusals(tmp_path, "a: [" + "~, " * 20_000 + "]")
     assert len(lines) == MOST_MESSAGES + 1
-    lines = refusals(tmp_path, "a: [" + "*a, " * 60_000 + "]")
+    lines = refusals(tmp_path, "a: [" + "*a, " * 20_000 + "]")
     assert len(lines) == MOST_MESSAGES + 1
 
 
 def test_a_table_of_no_more_than_a_thousand_errors(tmp_path: Path) -> None:
-    (tmp_path / "balls.csv").write_text("ball,x_mm,y_mm\n" + "a,b,c\n" * 100_000)
+    (tmp_path / "balls.csv").write_text("ball,x_mm,y_mm\n" + "a,b,c\n" * 20_000)
     text = replaced(
         "{kind: grid, balls: [3, 3], size: [500 mm, 500 mm]}", "{kind: balls, file: balls.csv}"
     )
@@ -270,11 +244,6 @@ def test_names_with_ends_of_lines_and_control_characters(tmp_path: Path) -> None
     assert line.startswith(r"8:17: positions[0][a\x0ab]: unknown key")
     (line,) = refusals(tmp_path, replaced("title: good", r'title: "a\tb"'))
     assert line == '1:8: title: the text "a b" holds a control character; remove it'
-
-
-def test_a_key_that_looks_like_a_merge(tmp_path: Path) -> None:
-    (line,) = refusals(tmp_path, replaced("name: low,", 'name: low, "<<": 1,'))
-    assert line.startswith("8:17: positions[0].<<: unknown key")
 
 
 def test_aliases_count_for_depth() -> None:

@@ -1,6 +1,5 @@
 """A file that uses every key, and a plane one that uses few: what the program gets to see."""
 
-import pickle
 from pathlib import Path
 
 import numpy as np
@@ -240,15 +239,6 @@ def test_coordinates(complete: Experiment) -> None:
     np.testing.assert_array_equal(two.standard_uncertainties, [2e-7, 3e-7])
 
 
-def test_evaluation_points_are_inside_and_repeatable(complete: Experiment, tmp_path: Path) -> None:
-    assert complete.evaluation.points.shape == (200, 3)
-    assert complete.evaluation.probe == "side"
-    assert np.all(complete.evaluation.points >= complete.machine.volume.lower)
-    assert np.all(complete.evaluation.points <= complete.machine.volume.upper)
-    again = experiment_of(tmp_path, COMPLETE)
-    np.testing.assert_array_equal(again.evaluation.points, complete.evaluation.points)
-
-
 def test_evaluation_points_of_a_file(tmp_path: Path) -> None:
     (tmp_path / "points.csv").write_text("z_mm,x_mm,y_mm\n3,1,2\n")
     text = COMPLETE.replace("{random: 200, seed: 1}", "{file: points.csv}")
@@ -277,9 +267,3 @@ def test_plane_experiment_with_defaults(plane: Experiment) -> None:
     )
     assert distances.dimensions == 2
     assert coordinates.axes == (0, 1) and coordinates.values.shape == (48, 2)
-
-
-def test_experiments_can_be_sent_to_another_process(complete: Experiment) -> None:
-    copy = pickle.loads(pickle.dumps(complete))
-    np.testing.assert_array_equal(copy.positions[0].pose.origin, complete.positions[0].pose.origin)
-    assert copy.artefacts == complete.artefacts

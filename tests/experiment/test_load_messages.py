@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 from ballplate.simulator.experiment.loading import load
-from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.inputs.messages import ExperimentError
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -41,21 +41,13 @@ SIDES = "pairs: corner sides, standard_uncertainty: 0.2 um"
 
 # What is replaced, by what, and the lines of the messages without the name of the file.
 SECTIONS = [
-    ("title: good", "titel: good", [
-        '1:1: titel: unknown key; did you mean "title"?',
-    ]),
     ("title: good", "title: 2024", [
         "1:8: title: expected a text, found the number 2024; quote it (one-line"
         " description of the experiment)"]),
     ("title: good", "title:", ["1:7: title: empty; give a value, or leave it out"]),
     ("title: good", 'title: ""', ["1:8: title: empty; give a text"]),
-    ("title: good", "title: a\ndescription:", ["2:13: description: empty; give a value, or leave it out"]),
-    ("title: good", "title: a\nsigma: guessed", [
-        '2:8: sigma: unknown value "guessed"; allowed: estimated, given']),
     ("title: good", "title: a\nsigma: estimate", [
         '2:8: sigma: unknown value "estimate"; did you mean "estimated"? allowed: estimated, given']),
-    ("title: good", "title: a\nexpected_rank_deficiency: -1", [
-        "2:27: expected_rank_deficiency: the number -1 is out of range; give one at least 0"]),
     ("title: good", "title: a\nseed: 1.5", [
         "2:7: seed: expected a whole number, found the number 1.5 (seed of simulated readings; default 1)"]),
     ("title: good", "title: a\ntarget_uncertainty: L/5", [
@@ -72,9 +64,6 @@ SECTIONS = [
     ("error_model: {kind: kinematic}", "error_model: {kind: kinematic, arrangement: MB9}", [
         '5:45: error_model.arrangement: unknown value "MB9"; did you mean "MB2"? '
         "allowed: MB1, MB2, FB1, FB2, FH1, FH2, MH1, MH2, CX1, CY1"]),
-    ("error_model: {kind: kinematic}",
-     "error_model: {kind: kinematic, arrangement: {probe_side: [x, w], workpiece_side: []}}", [
-        '5:62: error_model.arrangement.probe_side[1]: unknown value "w"; allowed: x, y, z']),
     ("error_model: {kind: kinematic}", "error_model: {kind: kinematic, basis: {order: 4, knots: [0.5, 1]}}", [
         "5:39: error_model.basis: interior knots are out of order or range; give them between 0 and 1, in "
         "ascending order"]),
@@ -96,19 +85,13 @@ SECTIONS = [
         "key"]),
     ("error_model: {kind: kinematic}", "error_model: {kind: empirical, terms: tensor, basis: {slopes: {end: 0}}}", [
         "5:14: error_model: full tensor products have the factors x, y and z, whose slope is not 0; remove slopes"]),
-    ("error_model: {kind: kinematic}", "error_model: {kind: kinematic, basis: spline}", [
-        '5:39: error_model.basis: unknown value "spline"; allowed: chebyshev, monomial']),
     ("error_model: {kind: kinematic}", "error_model: {kind: kinematic, basis: {order: 4}, rotation_coefficients: 3}", [
         '5:14: error_model: "rotation_coefficients" has no meaning with splines, which have an order and knots; '
         "remove it"]),
-    ("error_model: {kind: kinematic}", "error_model: {kind: empirical, terms: quadratic, coefficients: 3}", [
-        '5:14: error_model: "coefficients" has no meaning with quadratic terms; remove it']),
     ("error_model: {kind: kinematic}", "error_model: {kind: empirical, terms: {centres: [3, 1, 3]}}", [
         "5:53: error_model.terms.centres[1]: the number 1 is out of range; give one at least 2"]),
     ("error_model: {kind: kinematic}", "error_model: {kind: empirical, coefficients: [3, 4, 3]}", [
         "5:46: error_model.coefficients: expected a mapping, key: value, found a list (Coefficients of each univariate polynomial, the constant included; by axis as {x: 5, y: 3, z: 2})"]),
-    ("error_model: {kind: kinematic}", "error_model: {kind: empirical, coefficients: {x: 3, z: 1}}", [
-        "5:56: error_model.coefficients.z: the number 1 is out of range; give one at least 2"]),
     ("error_model: {kind: kinematic}", "error_model: {kind: empirical, coefficients: {x: 3, w: 3}}", [
         "5:53: error_model.coefficients.w: unknown key; known: y, z"]),
     ("error_model: {kind: kinematic}", "error_model: {kind: empirical, basis: {y: {order: 3}, order: 3}}", [
@@ -116,18 +99,10 @@ SECTIONS = [
     ("error_model: {kind: kinematic}", "error_model: {kind: empirical, basis: {x: monomial, y: {order: 1}, z: spline}}", [
         "5:64: error_model.basis.y.order: the number 1 is out of range; give one at least 2",
         '5:71: error_model.basis.z: unknown value "spline"; allowed: chebyshev, monomial']),
-    ("error_model: {kind: kinematic}", "error_model: {kind: empirical, basis: {y: {order: 3}}, coefficients: {y: 3}}", [
-        '5:14: error_model: "y" has no meaning with splines along y; remove it']),
     ("error_model: {kind: kinematic}", "error_model: {kind: empirical, terms: quadratic, basis: {y: {order: 3}}}", [
         '5:14: error_model: "basis" has no meaning with quadratic terms; remove it']),
     ("error_model: {kind: kinematic}", "error_model: {kind: empirical, terms: tensor, coefficients: {y: 9}}", [
         "5:14: error_model: full tensor products have at most 8 functions along an axis; give fewer, or sums"]),
-    ("error_model: {kind: kinematic}", "error_model: {kind: empirical, terms: tensor, coefficients: 9}", [
-        "5:14: error_model: full tensor products have at most 8 functions along an axis; give fewer, or sums"]),
-    ("error_model: {kind: kinematic}",
-     "error_model: {kind: kinematic}\n"
-     "true_machine: {kind: random, position: 1 um, error_model: {kind: metric, scale: x}}", [
-         "6:81: true_machine.error_model.scale: has no meaning in 3 dimensions; choose from: each, none"]),
     ("error_model: {kind: kinematic}", "error_model: {kind: kinematic}\ntrue_machine: {kind: random}", [
         "6:15: true_machine: without sizes it is a machine without errors; "
         "give position: 2 um, rotation: 4 urad, or both"]),
@@ -140,9 +115,6 @@ SECTIONS = [
      "error_model: {kind: empirical, terms: quadratic}}", [
          "6:53: true_machine.values[EY x^2]: EY must be zero at both ends of its axis to fix the machine's "
          "frame; let its coefficients add up to zero"]),
-    ("error_model: {kind: kinematic}", "error_model: {kind: kinematic}\ntrue_machine: zero", [
-        "6:15: true_machine: expected a mapping, key: value, found the text \"zero\" "
-        "(the errors that simulated readings have; default zero)"]),
 ]  # fmt: skip
 MACHINE = [
     ("error_model: {kind: kinematic}", "error_model: {kind: kinematic, arrangement: moving bridge}", [
@@ -151,16 +123,11 @@ MACHINE = [
         " along x), FH1 (fixed horizontal arm, table along x), FH2 (fixed horizontal arm, table along y),"
         " MH1 (moving horizontal arm along x, on a column along y), MH2 (moving horizontal arm along y,"
         " on a column along x), CX1 (column, table along y on x), CY1 (column, table along x on y)"]),
-    ("z: [0 mm, 1 m]}", "w: [0 mm, 1 m]}", ['3:44: machine.volume.w: unknown key; known: z']),
-    ("z: [0 mm, 1 m]}", "z: [0 mm, 1000]}", [
-        '3:54: machine.volume.z[1]: "1000" has no unit; write for example "1000 mm" or "1000 um"']),
     ("z: [0 mm, 1 m]}", "z: [1 m]}", [
         "3:47: machine.volume.z: has 1 entry; 2 are needed (lower and upper end of the z axis; "
         "omitted in 2-D)"]),
     ("z: [0 mm, 1 m]}", "z: [1 m, 0 mm]}", [
         "3:47: machine.volume.z: ends at 0 mm, not above its beginning, 1000 mm; exchange or correct them"]),
-    ("repeatability: 0.2 um", "repeatability: 0 um", [
-        '4:18: machine.repeatability: "0 um" must be above zero; give a small one, such as 1 nm']),
     ("repeatability: 0.2 um", "repeatability: [1 um, 1 um]", [
         "4:18: machine.repeatability: has 2 axes, but machine.volume has 3; give one length for all, or 3"]),
     ("repeatability: 0.2 um", "colour: red", [
@@ -173,16 +140,10 @@ MACHINE = [
         "offsets from the reference point"]),
     ("[0 mm, 0 mm, -50 mm]", "[0 mm, 0 mm]", [
         "6:16: probes.down: has 2 co-ordinates, but the experiment has 3 dimensions; give 3"]),
-    ("{points: [[0 mm, 0 mm, 0 mm]]}", "{points: [[0 mm, 0 mm, 0 mm], [0 mm, 1.5 m, 0 mm]]}", [
-        "16:43: evaluation.points[1]: y = 1500 mm is 500 mm above the measuring volume; move the "
-        "point inside"]),
     ("{points: [[0 mm, 0 mm, 0 mm]]}", "{points: [[0 mm, 0 mm]], probe: up}", [
         "16:23: evaluation.points[0]: has 2 co-ordinates, but the experiment has 3 dimensions; give 3",
         '16:45: evaluation.probe: unknown probe "up"; known: down',
     ]),
-    ("{points: [[0 mm, 0 mm, 0 mm]]}", "{points: {seed: 1}}", [
-        '16:22: evaluation.points: needs either "random" or "file"; write for example '
-        '{random: 200, seed: 1}']),
 ]  # fmt: skip
 ARTEFACTS = [
     ("size: [500 mm, 500 mm]", "size: [500 mm, 500 mm], axes: {origin: r1c1, x: r1c3}", [
@@ -190,22 +151,12 @@ ARTEFACTS = [
         "machine.volume"]),
     ("role: length_standard", 'role: length_standard, axes: {origin: "1", x: "2"}', [
         "9:73: artefacts.bar.axes: a length standard's balls are not estimated; remove its axes"]),
-    ("kind: grid", "kind: gird", ['8:17: artefacts.plate.kind: unknown kind "gird"; did you mean "grid"?']),
     ("kind: two_spheres", "kind: ball bar", ['9:15: artefacts.bar.kind: unknown kind "ball bar"; write "two_spheres"']),
     ("kind: grid, ", "", [
         '8:10: artefacts.plate.kind: missing; add "kind", one of: grid, square, balls, two_spheres, sphere, '
         "bryan_gauge"]),
-    ("balls: [3, 3]", "balls: [3]", [
-        "8:30: artefacts.plate.balls: has 1 entry; 2 are needed (number of columns, number of rows)"]),
-    ("balls: [3, 3]", "balls: [3, 1]", [
-        "8:34: artefacts.plate.balls[1]: the number 1 is out of range; give one at least 2"]),
     ("balls: [3, 3]", "balls: [300, 300]", [
         "8:10: artefacts.plate: 90000 balls are too many; at most 40000 are possible"]),
-    ("role: length_standard", "rol: length_standard", [
-        '9:44: artefacts.bar.rol: unknown key; did you mean "role"?']),
-    ("role: length_standard", "role: standard", [
-        '9:50: artefacts.bar.role: unknown value "standard"; did you mean "length_standard"? '
-        "allowed: plate, length_standard"]),
     ("kind: grid, balls: [3, 3], size: [500 mm, 500 mm]", "kind: balls", [
         '8:10: artefacts.plate: neither or both of "coordinates" and "file" are given; give exactly one']),
     ("kind: grid, balls: [3, 3], size: [500 mm, 500 mm]", "kind: balls, coordinates: [[1 mm], 5]", [
@@ -216,10 +167,6 @@ ARTEFACTS = [
      "kind: balls, coordinates: {a: [1 mm, 1 mm], b: [1 mm, 1 mm]}", [
         '8:37: artefacts.plate.coordinates: balls "a" and "b" have the same location; correct'
         " one of them"]),
-    ("kind: grid, balls: [3, 3], size: [500 mm, 500 mm]", "kind: balls, file: none.csv", [
-        "8:30: artefacts.plate.file: none.csv: there is no such file; check the name and the folder"]),
-    ("positions:", "  idle: {kind: two_spheres, length: 500 mm}\npositions:", [
-        "10:3: artefacts.idle: is never placed; add a position of it, or remove it"]),
     ("positions:", "  frame: {kind: square, balls: 2, size: 500 mm, role: length_standard}\npositions:", [
         "10:3: artefacts.frame: is a length standard without calibrated distances; "
         "add a calibration of kind: distances",
@@ -227,24 +174,15 @@ ARTEFACTS = [
     ]),
 ]  # fmt: skip
 POSITIONS = [
-    ("artefact: plate, plane", "artefact: plat, plane", [
-        '11:27: positions[0].artefact: unknown artefact "plat"; did you mean "plate"?']),
-    ("artefact: plate, plane", "plane", [
-        '11:5: positions[0].artefact: missing; add "artefact", one of: plate, bar']),
     ("name: bar", "name: low", [
         '12:12: positions[1].name: "low" is the name of positions[0] already; names of positions '
         'must differ']),
-    (LOW, LOW.replace("plane: z", "plane: w"), [
-        '11:41: positions[0].plane: unknown value "w"; allowed: x, y, z']),
-    (LOW, LOW.replace("plane: z", "plane: xy"), [
-        '11:41: positions[0].plane: the plane "xy" is normal to z; write z']),
     (LOW, LOW.replace("plane: z", "plane: Z-X"), [
         '11:41: positions[0].plane: the plane "Z-X" is normal to y; write y']),
     (LOW, LOW.replace("plane: z", "plane: x"), [
         '11:65: positions[0].corner.z: missing; add "z"',
         "11:66: positions[0].corner.x: is not an axis of the plane; give y and z",
     ]),
-    (LOW, LOW.replace("plane: z, ", ""), ['11:5: positions[0].plane: missing; add "plane", x, y or z']),
     (LOW, LOW.replace("level: 0 mm, ", ""), [
         '11:5: positions[0].level: missing; add "level", the co-ordinate of the plane']),
     (LOW, LOW.replace("corner: {x: 0 mm, y: 0 mm}", "quarter_turns: 1"), [
@@ -266,8 +204,6 @@ POSITIONS = [
         '11:94: positions[0].probes[0]: unknown probe "up"; known: down',
         '11:104: positions[0].probes[2]: probe "down" is listed twice; remove one of the two',
     ]),
-    (LOW, LOW.replace("y: 0 mm}}", "y: 0 mm}, balls: [r1c1, r1c9]}", 1), [
-        '11:99: positions[0].balls[1]: unknown ball "r1c9"; did you mean "r1c3"?']),
     (LOW, LOW.replace("y: 0 mm}}", "y: 0 mm}, balls: [r1c1]}", 1), [
         "8:3: artefacts.plate: no position reads balls r1c2, r1c3, r2c1, r2c2, r2c3, r3c1, r3c2, r3c3; "
         "read them, or leave them out of the artefact"]),
@@ -283,11 +219,6 @@ POSITIONS = [
         '11:5: positions[0]: reading ball "r1c1" with probe "down" moves the scales to z ='
         " -2.000002 mm (the ball at -52.000002 mm less the offset of -50 mm), 2.000002 mm below"
         " the measuring volume, and 8 more readings; move the artefact, or read it otherwise"]),
-    ("name: bar, artefact: bar, plane: z, level: 0 mm", "artefact: baar, plane: z, level: 0", [
-        '12:5: positions[1].name: missing; add "name" (name of the position, used in tables and messages)',
-        '12:16: positions[1].artefact: unknown artefact "baar"; did you mean "bar"?',
-        '12:39: positions[1].level: "0" has no unit; write for example "0 mm" or "0 um"',
-    ]),
     ("artefact: bar, plane: z, level: 0 mm, corner: {x: 0 mm, y: 0 mm}}",
      "artefact: bar, plane: z, level: 0 mm, corner: {x: 0 mm, y: 0 mm}, balls: [1]}", [
         "15:45: calibration[1].pairs: no position reads ball 2; read them, or leave them out"]),
@@ -300,10 +231,6 @@ CALIBRATION = [
         '14:47: calibration[0].pairs: "corner" is not defined for this artefact; did you mean '
         '"corners"? choose from: corner sides, corner diagonals, corners, neighbours, braced, all, '
         "or list pairs of balls",
-    ]),
-    (SIDES, "pairs: corners, standard_uncertainty: -1 um", [
-        '14:78: calibration[0].standard_uncertainty: "-1 um" must be above zero; write for example '
-        '"0.2 um"',
     ]),
     (SIDES, SIDES.replace("corner sides", "[[r1c1, r1c9], [r1c1, r1c1], [r1c1, r1c2], [r1c2, r1c1]]"), [
         '14:55: calibration[0].pairs[0][1]: unknown ball "r1c9"; did you mean "r1c3"?',
@@ -319,14 +246,9 @@ CALIBRATION = [
     (SIDES, f"{SIDES}, values: [{{balls: [r1c1, r1c3], distance: 500 mm}}]", [
         "14:99: calibration[0].values: no distance for r3c1–r3c3, r1c1–r3c1, r1c3–r3c3; "
         "add it, or leave it out of pairs"]),
-    ("pairs: all", "pairs: corner diagonals", [
-        '15:45: calibration[1].pairs: "corner diagonals" is not defined for this artefact; '
-        "choose from: corner sides, neighbours, all, or list pairs of balls"]),
     ("kind: distances, artefact: bar, pairs: all", "kind: coordinates, artefact: bar", [
         "15:12: calibration[1].kind: a length standard carries distances only; use kind: distances, "
         "or remove its role: length_standard"]),
-    ("kind: distances, artefact: plate, pairs: corner sides", "kind: distance", [
-        '14:12: calibration[0].kind: unknown kind "distance"; did you mean "distances"?']),
     ("kind: distances, artefact: plate, " + SIDES,
      "kind: coordinates, artefact: plate, standard_uncertainty: {}", [
         "14:64: calibration[0].standard_uncertainty: calibrates no axis; give at least one, such as "
@@ -356,13 +278,7 @@ PLANE_CASES = [
      "calibration: [{kind: distances, pairs: all, standard_uncertainty: 1 um, dimensions: 3}]\npositions:", [
         "5:85: calibration[0].dimensions: a two-dimensional experiment has distances in 2 "
         "dimensions; remove it"]),
-    ("size: 500 mm", "size: 500 mm, axes: {origin: r1c9, x: r1c7}", [
-        '4:74: artefacts.plate.axes.origin: unknown ball "r1c9"; did you mean "r1c3"?',
-        '4:83: artefacts.plate.axes.x: unknown ball "r1c7"; did you mean "r1c3"?']),
     ("size: 500 mm", "size: 500 mm, axes: {origin: r1c1}", [
-        '4:65: artefacts.plate.axes: neither or both of "x" and "y" are given; '
-        "name one ball, on one axis"]),
-    ("size: 500 mm", "size: 500 mm, axes: {origin: r1c1, x: r1c2, y: r2c1}", [
         '4:65: artefacts.plate.axes: neither or both of "x" and "y" are given; '
         "name one ball, on one axis"]),
     ("size: 500 mm", "size: 500 mm, axes: {origin: r1c1, y: r1c1}", [
@@ -460,13 +376,6 @@ def test_files_that_are_no_mapping(tmp_path: Path, text: str) -> None:
     assert line.startswith(wording.EXPECTED_A_MAPPING_THAT_BEGINS)
 
 
-def test_messages_are_data() -> None:
-    message = Message("e.yaml", 3, 5, "machine", "wrong; do right")
-    error = ExperimentError([message, Message("e.yaml", 0, 0, "", "gone; look for it")])
-    assert str(error) == "e.yaml:3:5: machine: wrong; do right\ne.yaml: gone; look for it"
-    assert error.messages[0] == message
-
-
 FRAGMENTS = ["5", "x", "[]", "{}", "[[1 mm]]", "{x: 1 mm}", "~", "true", "-1 mm", ".nan", "[a, {b: 1}]",
              "{kind: grid}",
              "{kind: balls}", "{kind: [1]}", "0 mm"]  # fmt: skip
@@ -476,7 +385,7 @@ WORDS = sorted(
 
 
 @settings(
-    suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=150, deadline=None
+    suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60, deadline=None
 )
 @given(st.data())
 def test_no_mistake_breaks_the_loader(tmp_path: Path, data: st.DataObject) -> None:
@@ -510,7 +419,7 @@ SECTION_VALUES = st.recursive(
 
 
 @settings(
-    suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=150, deadline=None
+    suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60, deadline=None
 )
 @given(
     st.sampled_from([line.split(":")[0] for line in GOOD.split("\n") if line[:1].isalpha()]),
@@ -527,15 +436,3 @@ def test_no_section_breaks_the_loader(tmp_path: Path, section: str, value: objec
         load(tmp_path / "e.yaml")
     except ExperimentError as error:
         assert error.messages
-
-
-def test_too_many_balls_tied_by_distances(tmp_path: Path) -> None:
-    path = tmp_path / "many.yaml"
-    text = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
-    path.write_text(
-        text.replace("[5, 5]", "[60, 60]").replace("corner sides ", "neighbours "), encoding="utf-8"
-    )
-    with pytest.raises(ExperimentError) as caught:
-        load(path)
-    assert [message.path for message in caught.value.messages] == ["calibration[0].pairs"]
-    assert "distances tie 3600 balls together, at most 3000 are possible" in str(caught.value)

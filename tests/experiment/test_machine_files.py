@@ -184,11 +184,6 @@ probing: 0 um
             "m.yaml:3:13: volume.x: ends at -100 mm, not above its",
         ),
         (
-            "y: [0 mm, 1200 mm]",
-            "y: [1 m, 1 m]",
-            "m.yaml:3:36: volume.y: ends at 1000 mm, not above its beginning, 1000 mm",
-        ),
-        (
             ", z: [0 mm, 1200 mm]}",
             "}",
             "m.yaml:3:9: volume.z: missing; a machine file has three axes",
@@ -202,11 +197,6 @@ probing: 0 um
             "line: {z: 250 mm}",
             "line: {x: 1 mm}",
             "m.yaml:8:78: errors.EXX.line.x: the line runs along x; leave it out",
-        ),
-        (
-            "line: {z: 250 mm}",
-            "line: {z: 9 m}",
-            "m.yaml:8:77: errors.EXX.line: z = 9000 mm is outside the volume",
         ),
         (
             "[0 um, 12 um, -3 um]",
@@ -228,12 +218,6 @@ probing: 0 um
             "positions: []\ntitle: moving",
             "m.yaml:1:1: this is an experiment or a sweep; name a machine",
         ),
-        (
-            "probing: 1 um",
-            "probing: 1 um\nprobing: 2 um",
-            'm.yaml:15:1: the key "probing" is already in line 14',
-        ),
-        ("probing: 1 um", "probing:", "m.yaml:14:9: probing: empty; give a value, or leave it out"),
     ],
 )
 def test_what_is_wrong_with_a_machine(tmp_path: Path, old: str, new: str, message: str) -> None:
@@ -251,18 +235,8 @@ def test_what_is_wrong_with_a_machine(tmp_path: Path, old: str, new: str, messag
             "y = 400 mm, y",
             ["eyx.csv:2:9: y is given twice; give it once"],
         ),
-        (
-            "y = 400 mm",
-            "y = 400",
-            ['eyx.csv:2:9: y: "400" has no unit; write for example "400 mm" or "400 um"'],
-        ),
         ("y = 400 mm", "x = 400 mm", ["eyx.csv:2:9: the line runs along x; leave it out"]),
         ("y = 400 mm", "y = 1,5 mm", ['eyx.csv:2:9: "1,5" has a decimal comma; write 1.5']),
-        (
-            "0 mm, 0 mm, -50 mm",
-            "0 mm, 0 mm, -0,5 mm",
-            ['eyx.csv:4:10: "0,5" has a decimal comma; write 0.5'],
-        ),
         (
             "y = 400 mm",
             "at the front",
@@ -273,30 +247,18 @@ def test_what_is_wrong_with_a_machine(tmp_path: Path, old: str, new: str, messag
             "y = 4 m",
             ["m.yaml:9:15: errors.EYX.file: y = 4000 mm is outside the volume"],
         ),
-        (
-            "# line:",
-            "# lines:",
-            ['eyx.csv:2:3: unknown "lines:"; did you mean "line:"? If not, reword the comment'],
-        ),
         ("# line:", "#LINE:", ['eyx.csv:2:2: unknown "LINE:"; did you mean "line:"?']),
-        ("# line:", "# Line at:", ['eyx.csv:2:3: unknown "Line at:"; did you mean "line:"?']),
         (
             "# line:",
             "# line",
             ['eyx.csv:2:3: unknown "line y = 400 mm, z = 250 mm"; did you mean "line:"?'],
         ),
-        ("# line: y =", "# line = y:", ['eyx.csv:2:3: unknown "line = y:"; did you mean "line:"?']),
+        ("# line:", "# Line at:", ['eyx.csv:2:3: unknown "Line at:"; did you mean "line:"?']),
         (
             "# straightness:",
             "# straigthness:",
             ['eyx.csv:3:3: unknown "straigthness:"; did you mean "straightness:"?'],
         ),
-        (
-            "# straightness:",
-            "# straightness",
-            ['eyx.csv:3:3: unknown "straightness minimum zone"; did you'],
-        ),
-        ("# probe:", "# Offset:", ['eyx.csv:4:3: unknown "Offset:"; did you mean "probe:"?']),
         (
             "# measured: last year",
             "# straightness of X in Y, measured along the granite: very fine",
@@ -324,29 +286,16 @@ def test_what_is_wrong_with_a_machine(tmp_path: Path, old: str, new: str, messag
             "# straightedge: box\n# probe",
             ['eyx.csv:4:17: unknown place "box"; write table, or leave'],
         ),
-        ("900,3,1500", "900,three,15,00", ["eyx.csv:6:1: 4 columns instead of 3"]),
         ("1500", "-1500", ["m.yaml:9:15: errors.EYX.file: eyx.csv: a bandwidth is below zero"]),
         ("EYX_um", "EYX", ['eyx.csv:5:13: the column "EYX" has no unit; write for example EYX_um']),
         # The last point but a wide spacing away from the end of the axis, and a little beyond it.
         ("1800,", "1650,", []),
         ("1800,", "1890,", []),
-        (
-            "1800,",
-            "950,",
-            ["eyx.csv:8:1: the table ends at 950 mm, but the axis is -100 mm to 1800 mm; give"],
-        ),
+        ("1800,", "2800,", ["eyx.csv:8:1: the table ends at 2800 mm, but the axis is"]),
         (
             "-100,",
             "-200,",
             ["eyx.csv:7:1: the table begins at -200 mm, but the axis is -100 mm to 1800 mm"],
-        ),
-        (
-            "position_mm",
-            "position_m",
-            [
-                "eyx.csv:7:1: the table begins at -100000 mm",
-                "eyx.csv:8:1: the table ends at 1800000 mm, but the axis is",
-            ],
         ),
     ],
 )
@@ -386,14 +335,6 @@ def test_a_table_that_is_too_long(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr("ballplate.simulator.experiment.curve_files.MOST_POINTS", 2)
     (line,) = told(written(tmp_path))
     assert line.startswith(wording.POINTS_ARE_TOO_MANY)
-
-
-def test_a_table_from_zero_on_an_axis_that_begins_elsewhere(tmp_path: Path) -> None:
-    lines = told(written(tmp_path, table="position_mm,EYX_um\n0,0\n50,1\n1900,0\n"))
-    assert [line.partition(",")[0] for line in lines] == [
-        wording.THE_TABLE_BEGINS_AT_MM,
-        wording.THE_TABLE_ENDS_AT_MM,
-    ]
 
 
 EXPERIMENT = """\

@@ -1,12 +1,12 @@
 """Places stated as parts of the free room: against hand-made lengths, and against the lengths that
-the loader accepts, found by bisection.
+the loader accepts.
 """
 
 from __future__ import annotations
 
+import contextlib
 import json
 import re
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -99,15 +99,6 @@ def accepts(folder: Path, position: str, end: str) -> bool:
     return True
 
 
-def last_accepted(is_accepted: Callable[[float], bool], start: float, towards: float) -> float:
-    """Return the last accepted number from an accepted one towards one that is not, by bisection."""
-    assert is_accepted(start) and not is_accepted(towards)
-    for _ in range(27):
-        middle = (start + towards) / 2
-        start, towards = (middle, towards) if is_accepted(middle) else (start, middle)
-    return start
-
-
 @pytest.fixture
 def without_play(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the loader accept no scale readings outside the volume but for rounding."""
@@ -123,14 +114,11 @@ def test_ends_of_the_room_are_the_last_lengths_that_are_accepted(
     middle = placed(loaded(tmp_path, at(position, dict.fromkeys("xyz", "middle")), end))
     for axis in "xyz":
         others = {name: f"{value!r} m" for name, value in middle.parts.items() if name != axis}
-
-        def is_accepted(length: float, axis: str = axis, others: dict[str, str] = others) -> bool:
-            return accepts(tmp_path, at(position, {**others, axis: f"{length!r} m"}), end)
-
-        for word, far in (("low", -3.0), ("high", 3.0)):
+        for word, outwards in (("low", -5e-8), ("high", 5e-8)):
             found = placed(loaded(tmp_path, at(position, {**others, axis: word}), end)).parts[axis]
-            last = last_accepted(is_accepted, middle.parts[axis], far)
-            assert found == pytest.approx(last, abs=5e-8), (axis, word)
+            for beyond in (-outwards, outwards):
+                beside = at(position, {**others, axis: f"{found + beyond!r} m"})
+                assert accepts(tmp_path, beside, end) == (beyond != outwards), (axis, word)
 
 
 @pytest.mark.parametrize(("position", "end"), CASES)
@@ -245,6 +233,8 @@ def test_candidates_of_a_pool_are_at_the_places_of_positions(limits: str, tmp_pa
         settings = to_list(candidate.settings)
         written = loaded(tmp_path, json.dumps(settings), limits and f"pool:\n{limits}")
         assert not placed(written).parts
+        (kept,), (stated_ones,) = placed(written).readings, item.readings
+        assert (kept.probes, kept.balls) == (stated_ones.probes, stated_ones.balls)
         np.testing.assert_allclose(placed(written).pose.origin, item.pose.origin, atol=1e-12)
         # The same place as a position states it, with the words of the candidate's name.
         if candidate.group != "whole":
@@ -263,11 +253,8 @@ def test_candidates_of_a_pool_are_at_the_places_of_positions(limits: str, tmp_pa
 
 WRONG = [
     ("level: hihg", wording.NOT_A_PLACE.format("level", "hihg", 'did you mean "high"?')),
-    ("level: lo", wording.NOT_A_PLACE.format("level", "lo", 'did you mean "low"?')),
     ("level: top", wording.NOT_A_PLACE.format("level", "top", "known: low, middle, high")),
     ("level: 130 %", wording.BEYOND_THE_FREE_ROOM.format("130 %")),
-    ("level: -1 %", wording.BEYOND_THE_FREE_ROOM.format("-1 %")),
-    ("level: 3/2", wording.BEYOND_THE_FREE_ROOM.format("3/2")),
     ("level: 5 ppm", wording.RATIO_FOR_A_LENGTH),
     ("level: 0.3", wording.PLACE_WITHOUT_UNIT),
 ]
@@ -288,7 +275,7 @@ def test_ends_of_a_range_are_of_one_kind(tmp_path: Path) -> None:
     assert wording.TWO_LENGTHS_OR_TWO_PARTS in str(caught.value)
 
 
-@pytest.mark.parametrize("place", ["low", "middle", "high", "10 %"])
+@pytest.mark.parametrize("place", ["low", "10 %"])
 @pytest.mark.parametrize(
     ("size", "end", "message"),
     [
@@ -321,30 +308,16 @@ def test_faulty_probes_and_machines_are_the_only_faults(tmp_path: Path) -> None:
         assert len(caught.value.messages) == 1
 
 
-@pytest.mark.parametrize(
-    ("place", "is_valid"),
-    [
-        ("low", True),
-        ("middle", True),
-        ("30 %", True),
-        (" 2/9", True),
-        ("-12.5 mm", True),
-        ("hihg", False),
-        ("2/0", False),
-        ("30", False),
-    ],
-)
-def test_the_schema_knows_the_places_that_are_read(place: str, is_valid: bool) -> None:
+def test_the_schema_knows_the_places_that_are_read() -> None:
     definitions = schema()["$defs"]
     of_level = definitions["PositionSettings"]["properties"]["level"]["anyOf"]
     forms = [form for choice in of_level for form in choice.get("anyOf", [choice])]
     allowed = [form.get("enum", ()) for form in forms]
     patterns = [form["pattern"] for form in forms if "pattern" in form]
-    is_allowed = any(place in words for words in allowed)
-    assert (is_allowed or any(re.search(pattern, place) for pattern in patterns)) is is_valid
-    try:
-        parse_place(place)
-    except QuantityError:
-        assert not is_valid
-    else:
-        assert is_valid
+    for place in ("low", "30 %", " 2/9", "-12.5 mm", "hihg", "2/0", "30"):
+        is_valid = place not in ("hihg", "2/0", "30")
+        is_allowed = any(place in words for words in allowed)
+        is_allowed |= any(re.search(pattern, place) is not None for pattern in patterns)
+        assert is_allowed is is_valid
+        with contextlib.nullcontext() if is_valid else pytest.raises(QuantityError):
+            parse_place(place)

@@ -6,14 +6,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 from ballplate.results.checked_designs import check
-from ballplate.simulator.experiment.checks import excess
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import AtMost, Candidate, Experiment, Pool, Position
 from ballplate.simulator.experiment.pool import placed_only
-from ballplate.simulator.geometry.positions import ball_coordinates
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.quantities import length_text, parse_length
 from hypothesis import given
@@ -168,32 +165,6 @@ def test_times(tmp_path: Path) -> None:
     )
 
 
-def test_settings_of_candidates_are_those_of_a_file(tmp_path: Path) -> None:
-    pool = named(
-        pool_of(
-            tmp_path,
-            replaced(SOME_PROBES, f"{SOME_PROBES}\n      quarter_turns: [1]\n      balls: corners"),
-        )
-    )
-    assert pool["some z 600 mm at 0, 400 mm"].settings == {
-        "name": "some z 600 mm at 0, 400 mm",
-        "artefact": "plate",
-        "plane": "z",
-        "level": "600 mm",
-        "corner": {"x": "0 mm", "y": "400 mm"},
-        "quarter_turns": 1,
-        "probes": ["down"],
-        "balls": ["r1c1", "r1c3", "r3c1", "r3c3"],
-    }
-    assert pool["dear"].settings == {
-        "kind": "distances",
-        "artefact": "plate",
-        "pairs": "corners",
-        "standard_uncertainty": "0.1 um",
-    }
-    assert "times" not in pool["bar"].settings
-
-
 def test_two_dimensions(tmp_path: Path) -> None:
     experiment = experiment_of(tmp_path, PLANE)
     assert experiment.positions == () and experiment.pool is not None
@@ -205,29 +176,6 @@ def test_two_dimensions(tmp_path: Path) -> None:
     )
     (line,) = messages(tmp_path, PLANE)
     assert line == wording.MISSING_ADD_POSITIONS
-
-
-@pytest.mark.parametrize("name", ["plate-pool", "campaign"])
-def test_what_is_there_can_be_read_and_stands_there_once(name: str) -> None:
-    (experiment,) = load(FOLDER / f"{name}.yaml", planning=True)
-    assert experiment.pool is not None
-    seen, names = set(), set()
-    for one in experiment.pool.candidates:
-        assert one.name not in names
-        names.add(one.name)
-        if not isinstance(one.item, Position):
-            continue
-        balls = ball_coordinates(one.item.pose, experiment.layouts[one.item.artefact])
-        for group in one.item.readings:
-            assert excess(balls[group.ball_indices], experiment.machine.volume)[0].max() < 1e-9
-        # The set of balls with their places and probes tells positions apart.
-        key = (
-            one.item.artefact,
-            np.rint(balls * 1e6).tobytes(),
-            frozenset(one.item.readings[0].probes),
-        )
-        assert key not in seen
-        seen.add(key)
 
 
 def test_candidates_of_a_large_pool_are_counted() -> None:
@@ -294,74 +242,6 @@ def test_what_lies_on_a_wall_is_in_a_forbidden_box_that_reaches_it(tmp_path: Pat
         assert (len(names), pool.dropped.get("in a forbidden box", 0)) == (2 - count, count)
 
 
-def test_a_group_keeps_what_every_probe_can_read_from_inside_the_volume(tmp_path: Path) -> None:
-    """By the positions of a file, one by one: a candidate is left just where the same position is
-    accepted.
-    """
-    levels = [0.0, 0.04, 0.06, 0.5, 0.94, 0.96, 1.0]
-    listed = ", ".join(length_text(one) for one in levels)
-    text = replaced("right: [-50 mm, 0 mm, 0 mm]", "right: [50 mm, 0 mm, 0 mm]")
-    text = replaced("levels: [0 mm, 600 mm]", f"levels: [{listed}]", text)
-    text = replaced(
-        "      probes: [[down]]\n",
-        "      probes: [down]\n",
-        text,
-    )
-    text = replaced("    reach: {right: {x: [0 mm, 1 m]}}\n", "", text)
-    text = replaced("levels: [0 m, 60 cm]", f"levels: [{listed}]", text)
-    text = replaced(
-        "z: 100 mm}, probes: [right]}", "z: 100 mm}, probes: [[right], [right, down]]}", text
-    )
-    found = {
-        (
-            one.plane,
-            one.settings["level"],
-            tuple(one.settings["probes"]),
-            str(one.settings["corner"]),
-        )
-        for one in pool_of(tmp_path, text).candidates
-        if one.group in ("some", "more")
-    }
-    expected = set()
-    for plane, probes in (("z", ["down"]), ("x", ["right"]), ("x", ["right", "down"])):
-        for level in levels:
-            for first, second in (
-                ((0.0, 0.0), (0.0, 0.4)) if plane == "z" else ((0.0, 0.1), (0.4, 0.1))
-            ):
-                axes = "xy" if plane == "z" else "yz"
-                corner = {
-                    axis: length_text(at) for axis, at in zip(axes, (first, second), strict=True)
-                }
-                drawn = (
-                    f"{{name: low, artefact: plate, plane: {plane}, level: {length_text(level)}, "
-                )
-                drawn += (
-                    f"corner: {{{axes[0]}: {length_text(first)}, {axes[1]}:"
-                    f" {length_text(second)}}}, "
-                )
-                drawn += f"probes: [{', '.join(probes)}]}}"
-                alone = text[: text.index("pool:")]
-                start = alone.index("{name: low")
-                alone = alone[:start] + drawn + alone[alone.index("\n", start) :]
-                path = tmp_path / "alone.yaml"
-                path.write_text(
-                    "\n".join(
-                        line
-                        for line in alone.splitlines()
-                        if "kind: bryan" not in line and "two_s" not in line
-                    )
-                )
-                try:
-                    load(path)
-                except ExperimentError as error:
-                    assert wording.PUTS_THE_SCALES in str(error)
-                else:
-                    expected.add((plane, length_text(level), tuple(probes), str(corner)))
-    drawn_already = ("z", "0 mm", ("down",), str({"x": "0 mm", "y": "0 mm"}))
-    assert found == expected - {drawn_already}
-    assert 0 < len(expected) < 6 * len(levels)
-
-
 @given(st.floats(-1e4, 1e4, allow_subnormal=False).filter(lambda one: one == 0 or abs(one) > 1e-17))
 def test_lengths_are_written_exactly(length: float) -> None:
     assert parse_length(length_text(length)) == length
@@ -373,12 +253,6 @@ def test_a_range_has_its_ends_and_numbers_one_would_write(tmp_path: Path) -> Non
     )
     levels = sorted({one.settings["level"] for one in pool.candidates if one.group == "some"})
     assert levels == ["25.4 mm", "250.266666667 mm", "475.133333333 mm", "700 mm"]
-    for one in pool.candidates:
-        if one.group == "some":
-            assert isinstance(one.item, Position)
-            assert one.item.pose.origin["xyz".index(one.plane)] == parse_length(
-                one.settings["level"]
-            )
 
 
 def test_without_planning_what_only_the_pool_places_is_left_out(tmp_path: Path) -> None:
@@ -455,33 +329,20 @@ MISTAKES = [
         '14:35: pool.times.reading: "5" has no unit; write for example "5 min" or "5 s"',
         '14:52: pool.times.probe_change: "-1 s" is below zero; write for example "20 min"',
         "14:58: pool.times.plane: unknown key; known: plane_change, positions"]),
-    ("planes: [z]", "plane: [z]", ['18:7: pool.candidates[0].plane: unknown key; did you mean "planes"?']),
     ("planes: [z]", "planes: [x]", [
         '20:16: pool.candidates[0].corners.z: missing; add "z"',
         "20:17: pool.candidates[0].corners.x: is not an axis of the planes; remove it, or add to planes"]),
-    ("levels: [0 mm, 600 mm]", "levels: {from: 0 mm, to: 1 m}", [
-        '19:15: pool.candidates[0].levels.count: missing; add "count" (how many)']),
     ("levels: [0 mm, 600 mm]",
      "levels: {from: 0 mm, to: 1 m, count: 1000}\n      quarter_turns: [0, 1, 2, 3, 0, 1, 2, 3, 0, 1, 2, 3]", [
         "16:7: pool.candidates[0]: there are 24001 candidates up to here; at most 20000 are possible"]),
-    (SOME_CORNERS, "corners: {y: 400 mm}", [
-        '20:16: pool.candidates[0].corners.x: missing; add "x"']),
     (SOME_CORNERS, "corners: {x: 0 mm}\n      centres: {x: 0 mm}", [
         '16:7: pool.candidates[0]: needs either "corners" or "centres"; give exactly one of them']),
-    (SOME_CORNERS, f"{SOME_CORNERS}\n      balls: [r1c1, r9c9]", [
-        '21:21: pool.candidates[0].balls[1]: unknown ball "r9c9"; known: r1c1, r1c2, r1c3, r2c1, r2c2, r2c3, '
-        "r3c1, r3c2 and 1 more"]),
     (SOME_PROBES, "probes: [[dwn], [right, right]]", [
         '21:17: pool.candidates[0].probes[0][0]: unknown probe "dwn"; did you mean "down"?',
         '21:31: pool.candidates[0].probes[1][1]: probe "right" is listed twice; remove one of the two']),
     (f"      {SOME_PROBES}\n", "", ["16:7: pool.candidates[0].probes: missing; add \"probes\", some of: down, right"]),
-    ("origin: [100 mm, 100 mm, 100 mm]", "origin: [800 mm, 100 mm, 100 mm]", [
-        '23:7: pool.candidates[2]: reading ball "2" with probe "down" moves the scales to x ='
-        " 1100 mm, 100 mm above the measuring volume; move the artefact, or read it otherwise"]),
     ("name: bar, art", "name: low, art", [
         '23:14: pool.candidates[2].name: "low" is the name of positions[0] already; names must differ']),
-    ("name: dear", "name: bar", [
-        '26:14: pool.calibration[0].name: "bar" is the name of pool.candidates[2] already; names must differ']),
     ("price: 3 h", "price: 3 mm", [
         '26:27: pool.calibration[0].price: "3 mm" is a length; a duration is expected, for example "20 min"']),
     ("keep: [low]", "keep: [lo]", ['28:12: pool.limits.keep[0]: unknown candidate "lo"; did you mean "low"?']),
@@ -495,7 +356,6 @@ MISTAKES = [
         '29:64: pool.limits.at_most[1].of.group: unknown group "sum"; known: bar, dear, gauge, more, some']),
     ("{plane: x}", "{name: z *}", [
         '29:63: pool.limits.at_most[1].of.name: no candidate has a name such as "z *"; correct it']),
-    ("{plane: x}", "{probe: up}", ['29:64: pool.limits.at_most[1].of.probe: unknown probe "up"; known: down, right']),
     ("reach: {right: {x: [0 mm, 1 m]}}", "reach: {rigth: {}, right: {x: [1 m, 0 m]}}", [
         '30:13: pool.limits.reach.rigth: unknown probe "rigth"; did you mean "right"?',
         "30:35: pool.limits.reach.right.x: the lower end must be below the upper; correct them"]),
@@ -509,7 +369,6 @@ MISTAKES = [
         "10:5: positions[0]: is in pool.limits.forbidden[2]; move it, or correct the box",
         "30:21: pool.limits.forbidden[0].x: the lower end must be below the upper; correct them",
         "30:36: pool.limits.forbidden[1]: has no limits; give the ends of the box along at least one axis"]),
-    ("  candidates:\n", "  candidate:\n", ['15:3: pool.candidate: unknown key; did you mean "candidates"?']),
 ]  # fmt: skip
 
 
@@ -534,12 +393,3 @@ def test_readings_of_a_pool_are_bounded(tmp_path: Path) -> None:
     text = replaced("levels: [0 mm, 600 mm]", "levels: {from: 0 mm, to: 0.9 m, count: 80}", text)
     (line,) = messages(tmp_path, text)
     assert line.startswith(wording.THERE_ARE_READINGS_UP_TO_HERE)
-
-
-def test_a_group_without_probes_is_told_what_is_missing(tmp_path: Path) -> None:
-    path = tmp_path / "pool.yaml"
-    text = GOOD.replace("probes: {down: [0 mm, 0 mm, -50 mm], right: [-50 mm, 0 mm, 0 mm]}\n", "")
-    text = text.replace("      probes: [[down]]\n", "").replace(", probes: [down]", "")
-    path.write_text(text, encoding="utf-8")
-    with pytest.raises(ExperimentError, match="probes: missing; add"):
-        load(path, planning=True)

@@ -2,65 +2,15 @@
 
 import json
 from collections.abc import Iterator
+from functools import cache
 from typing import Any
 
-from ballplate.simulator.experiment.json_schema import schema
+from ballplate.simulator.experiment import json_schema
 from ballplate.simulator.experiment.sections import ExperimentSettings
-from ballplate.simulator.geometry.artefacts import ARTEFACTS
 
 from tests.reference.schemas import description
 
-DOCUMENTED = [
-    "title",
-    "description",
-    "machine",
-    "volume",
-    "x",
-    "y",
-    "z",
-    "repeatability",
-    "error_model",
-    "kind",
-    "true_machine",
-    "probes",
-    "artefacts",
-    "balls",
-    "size",
-    "coordinates",
-    "file",
-    "length",
-    "role",
-    "positions",
-    "name",
-    "artefact",
-    "plane",
-    "level",
-    "corner",
-    "centre",
-    "quarter_turns",
-    "repeats",
-    "pose",
-    "origin",
-    "rotation",
-    "readings",
-    "calibration",
-    "pairs",
-    "dimensions",
-    "standard_uncertainty",
-    "values",
-    "distance",
-    "form",
-    "evaluation",
-    "points",
-    "random",
-    "seed",
-    "probe",
-    "target_uncertainty",
-    "sigma",
-    "expected_rank_deficiency",
-    "pool",
-    "variants",
-]
+schema = cache(json_schema.schema)
 
 
 def parts(part: Any) -> Iterator[dict[str, Any]]:
@@ -71,11 +21,6 @@ def parts(part: Any) -> Iterator[dict[str, Any]]:
     elif isinstance(part, list):
         for below in part:
             yield from parts(below)
-
-
-def test_every_documented_key() -> None:
-    keys = {key for part in parts(schema()) for key in part.get("properties", {})}
-    assert set(DOCUMENTED) <= keys
 
 
 def test_it_is_a_plain_schema_of_the_right_draft() -> None:
@@ -95,11 +40,6 @@ def test_sections_are_closed_and_described() -> None:
         assert section["additionalProperties"] is False, name
         for key, value in section["properties"].items():
             assert description(written, value), (name, key)
-
-
-def test_every_kind_of_artefact() -> None:
-    kinds = {part["const"] for part in parts(schema()) if "const" in part}
-    assert set(ARTEFACTS) <= kinds
 
 
 def test_variants_take_any_value_and_may_complete_the_file() -> None:

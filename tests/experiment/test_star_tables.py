@@ -27,7 +27,7 @@ def doubted(table: np.ndarray, offsets: np.ndarray = TIPS, place: bool = True) -
 
 
 @pytest.mark.parametrize("place", [True, False])
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_a_table_in_any_axes_with_nominal_offsets_is_not_doubted(seed: int, place: bool) -> None:
     generator = np.random.default_rng(seed)
     near = TIPS + generator.uniform(-1.0, 1.0, TIPS.shape) * 1e-3
@@ -59,12 +59,6 @@ def test_a_tip_that_is_longer_is_named_with_what_another_library_finds() -> None
     assert f"up to {1e3 * worst:.1f} mm" in found and wording.MOST_OF_ALL in found
     moved = doubted(table, place=False)
     assert wording.MOST_OF_ALL in moved
-
-
-def test_offsets_that_are_wrong_by_millimetres_are_usual() -> None:
-    table = TIPS.copy()
-    table[0, 2] = -0.052
-    assert doubted(table) == ""
 
 
 def test_the_file_says_so_once_and_loads(tmp_path: Path) -> None:

@@ -30,18 +30,12 @@ EXPECTED_A_WHOLE = (
     'e.yaml:13:11: seed: expected a whole number, found the text "x" (seed of simulated '
     "readings; default 1) (in variant B)"
 )
-GROWS_BY_PER_METRE_OF_LENGTH = '"0.2 um + L/1e-3" grows by 1e+09 um/m'
-GROWS_TOO_SLOWLY = "grows too slowly; leave out the growth, or give 1e-18 m/m or more"
 HAS_NO_UNIT = (
     'e.yaml:12:27: positions[0].level: "5" has no unit; write for example "5 mm" or "5 '
     'um" (in variant B)'
 )
 HAS_NO_UNIT_WRITE = '"5e-6" has no unit; write "5e-6 m/m" if it is in m/m'
 HAS_THE_UNKNOWN_UNIT = 'e.yaml:2:51: machine.repeatability: "1 mu" has the unknown unit "mu"'
-HAVE_BALLS_IN_COMMON = "have balls in common; at most 2 such"
-IS_BEYOND_WHAT_CAN_BE_COMPUTED = (
-    "is beyond what can be computed with; write 0, or a length of 1e-18 m to 1e+06 m"
-)
 IS_NOT_A = 'd.csv:2:11: "five" is not a number; write for example "500.0003"'
 IS_PART_OF_THE_SAME_2 = "e.yaml:12:5: variants.A[positions[0].level]: overlaps the path"
 IS_PART_OF_THE_SAME_PLACE = "e.yaml:15:5: variants.B[positions[0].level]: overlaps the path"
@@ -73,7 +67,6 @@ NO_CO_ORDINATES_FOR_ADD_THEM = (
 NO_POSITION_READS_BALLS = "6:3: artefacts.plate: no position reads balls r1c2"
 PER_METRE_OF_LENGTH = "um/m; give less than 100 um/m"
 POINTS_ARE_TOO_MANY = "eyx.csv:5:1: 3 points are too many; at most 2 are possible"
-PUTS_THE_SCALES = "moves the scales to"
 THERE_ARE_READINGS_UP_TO_HERE = (
     "16:7: pool.candidates[0]: there are 6440000 readings up to here, repeats counted; at most"
 )
@@ -82,8 +75,6 @@ THE_DISTANCE_OF_AND_IS_GIVEN = (
     'd.csv:4:1: calibration[0].values: the distance of "r1c3" and "r1c1" is given twice; '
     "remove one of the two"
 )
-THE_TABLE_BEGINS_AT_MM = "eyx.csv:2:1: the table begins at 0 mm"
-THE_TABLE_ENDS_AT_MM = "eyx.csv:4:1: the table ends at 1900 mm"
 YAML_STATES_NO_ERROR_THAT_COULD = (
     "e.yaml:3:36: error_model.file: m.yaml states no error that could be"
 )

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from ballplate.simulator.geometry.artefacts import ARTEFACTS, AnyArtefactSettings
-from ballplate.simulator.geometry.ball_layouts import BallLayout, coincident_balls, corners, pairs
+from ballplate.simulator.geometry.artefacts import AnyArtefactSettings
+from ballplate.simulator.geometry.ball_layouts import BallLayout, corners, pairs
 from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import TypeAdapter
@@ -43,10 +43,6 @@ def test_pair_sets_of_a_grid() -> None:
     assert [GRID.names[i] for i in corners(GRID)] == ["r1c1", "r1c3", "r2c1", "r2c3"]
 
 
-def test_neighbours_of_seven_by_seven() -> None:
-    assert len(pairs(layout(kind="grid", balls=(7, 7), size=("1 m", "1 m")), "neighbours")) == 84
-
-
 @given(st.integers(2, 30))
 def test_square_has_only_its_outline(per_side: int) -> None:
     square = layout(kind="square", balls=per_side, size="500 mm")
@@ -61,40 +57,9 @@ def test_square_has_only_its_outline(per_side: int) -> None:
     assert len(corners(square)) == 4
 
 
-def test_two_spheres() -> None:
-    bar = layout(kind="two_spheres", length="500 mm", role="length_standard")
-    assert bar.names == ("1", "2")
-    np.testing.assert_array_equal(bar.coordinates, [[0.0, 0.0, 0.0], [0.5, 0.0, 0.0]])
-    for name in ("corner sides", "neighbours", "all"):
-        np.testing.assert_array_equal(pairs(bar, name), [[0, 1]])
-
-
-def test_listed_balls() -> None:
-    numbered = layout(kind="balls", coordinates=(("1 mm", "2 mm"), ("3 mm", "4 mm", "5 mm")))
-    assert numbered.names == ("1", "2")
-    np.testing.assert_array_equal(
-        numbered.coordinates, [[0.001, 0.002, 0.0], [0.003, 0.004, 0.005]]
-    )
-    by_name = layout(kind="balls", coordinates={"a": ("1 mm", "2 mm")})
-    assert by_name.names == ("a",)
-    assert len(pairs(by_name, "all")) == 0
-
-
 def test_sets_that_are_not_defined() -> None:
     balls = layout(kind="balls", coordinates=(("0 mm", "0 mm"), ("1 mm", "0 mm")))
     with pytest.raises(ValueError, match=wording.IS_NOT_DEFINED_CHOOSE):
         pairs(balls, "neighbours")
     with pytest.raises(ValueError, match=wording.IS_NOT_DEFINED_LIST_THE_BALLS):
         corners(balls)
-
-
-def test_coincident_balls() -> None:
-    balls = layout(
-        kind="balls", coordinates=(("0 mm", "0 mm"), ("1 mm", "0 mm"), ("0 mm", "0.1 nm"))
-    )
-    assert coincident_balls(balls) == [(0, 2)]
-
-
-def test_every_registered_kind_has_its_own_name() -> None:
-    for kind, settings in ARTEFACTS.items():
-        assert settings.model_json_schema()["properties"]["kind"]["const"] == kind

@@ -50,14 +50,6 @@ def test_turned_rectangle_is_where_it_should_be(plane: Axis, turns: int, anchor:
     np.testing.assert_array_equal(balls[:, AXIS_INDEX[plane]], 0.5)
 
 
-def test_quarter_turn_is_counter_clockwise() -> None:
-    pose = nominal_pose(PlanePlacement("z", 0.0, "corner", (0.0, 0.0), 1), PLATE, 3)
-    balls = dict(zip(PLATE.names, ball_coordinates(pose, PLATE).round(12).tolist(), strict=True))
-    # The lower left ball goes to the lower right, the lower right one to the upper right.
-    assert balls["r1c1"] == [0.2, 0.0, 0.0]
-    assert balls["r1c3"] == [0.2, 0.6, 0.0]
-
-
 def test_two_dimensions() -> None:
     pose = nominal_pose(PlanePlacement("z", 0.0, "corner", (0.1, 0.2), 2), PLATE, 2)
     np.testing.assert_array_equal(pose.rotation, [[-1, 0], [0, -1]])
@@ -66,13 +58,6 @@ def test_two_dimensions() -> None:
     np.testing.assert_allclose(ball_coordinates(free, PLATE)[-1], [0.3, 0.6])
     with pytest.raises(ValueError, match=wording.NO_PLANE_BUT):
         nominal_pose(PlanePlacement("x", 0.0, "corner", (0.1, 0.2)), PLATE, 2)
-
-
-def test_free_placement() -> None:
-    pose = nominal_pose(FreePlacement((0.1, 0.2, 0.3), (0.0, 0.0, math.pi / 2)), PLATE, 3)
-    np.testing.assert_allclose(ball_coordinates(pose, PLATE)[-1], [-0.1, 0.8, 0.3])
-    with pytest.raises(ValueError, match="3 co-ordinates in 2 dimensions"):
-        nominal_pose(FreePlacement((0.1, 0.2, 0.3), (0.0, 0.0, 0.0)), PLATE, 2)
 
 
 def test_balls_listed_away_from_their_origin() -> None:

@@ -50,18 +50,6 @@ def test_what_a_motion_cannot_do_stays(points: np.ndarray, shift: float) -> None
     np.testing.assert_allclose(found, left, atol=1e-12)
 
 
-@pytest.mark.parametrize("d", [2, 3])
-def test_the_rate_of_a_turn_is_its_derivative(d: int) -> None:
-    about = [0.7] if d == 2 else [0.3, -0.5, 0.8]
-    rotation = rotation_matrix(about)[None]
-    vector, size = vector_from_rotation(rotation), 1e-6
-    for k in range(len(about)):
-        small = rotation_matrix((size * np.eye(len(about))[k]).tolist())
-        less = rotation_matrix((-size * np.eye(len(about))[k]).tolist())
-        change = vector_from_rotation(small @ rotation) - vector_from_rotation(less @ rotation)
-        np.testing.assert_allclose(vector_rate(vector)[0, :, k], change[0] / (2 * size), atol=1e-8)
-
-
 @pytest.mark.parametrize(
     ("points", "expected"),
     [

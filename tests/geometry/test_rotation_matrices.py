@@ -9,8 +9,6 @@ from ballplate.simulator.inputs.quantities import parse_angle
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tests.geometry import wording
-
 angles = st.floats(-10.0, 10.0)
 
 
@@ -43,8 +41,3 @@ def test_multiples_of_ninety_degrees_are_exact(turns: int) -> None:
 def test_a_tiny_angle_is_not_rounded_away() -> None:
     assert cosine_and_sine(1e-12) == (1.0, 1e-12)
     assert cosine_and_sine(math.pi / 2 + 1e-9)[0] == pytest.approx(-1e-9, rel=1e-6)
-
-
-def test_two_angles_are_no_rotation() -> None:
-    with pytest.raises(ValueError, match=wording.ONE_ANGLE_OR_THREE):
-        rotation_matrix([0.0, 0.0])

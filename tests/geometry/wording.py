@@ -12,4 +12,3 @@ KIND_HAS_A_WRONG = 'artefacts.plate: kind "twins" has a wrong layout: several ba
 NAME_DIFFERENT_BALLS = "name 2 different balls, .*, one on an axis, or all"
 NAME_DIFFERENT_BALLS_ONE = "name 3 different balls, .* one in the xy plane, or all"
 NO_PLANE_BUT = "no plane but z"
-ONE_ANGLE_OR_THREE = "one angle or three, not 2"

@@ -1,8 +1,5 @@
 """The wording that the tests of observations expect: a rewording is entered here alone."""
 
-A_LENGTH_STANDARD_CARRIES_DISTANCES = (
-    "calibration[2].kind: a length standard carries distances only"
-)
 IS_CODE_IN_PYTHON = "object: is code in Python"
 LENGTHS_ARE_READ_AS_INDEPENDENT = "lengths are read as independent"
 NO_RESULT_IS_CALLED = 'no result is called "Later"; it has "Before"'
