@@ -56,6 +56,14 @@ def plain(design: Design) -> Design:
     return undisturbed.observed(replace(given, **none, influence=None))
 
 
+def nominal_arms(design: Design) -> Real:
+    """From the centres of artefacts to the balls read (m, d), turned as the artefacts are."""
+    readings, state = design.readings, nominal_state(design)
+    return np.asarray(
+        np.einsum("mij,mj->mi", state.rotations[readings.position], state.balls[readings.ball])
+    )
+
+
 def dense_spread(design: Design, law: Law, spread: Real) -> tuple[dense.Spread, dense.Problem]:
     """The dense covariance of a design whose last parameters are influences with these prior
     uncertainties, infinite ones of what is unknown.
@@ -103,8 +111,7 @@ def _campaigns(
     generator = np.random.default_rng(20261122)
     state, readings = nominal_state(design), design.readings
     p = state.probes[readings.probe]
-    arms = np.einsum("mij,mj->mi", state.rotations[readings.position], state.balls[readings.ball])
-    true = arms + state.origins[readings.position]
+    true = nominal_arms(design) + state.origins[readings.position]
     given = design.of(CalibratedDistances)
     for _ in range(count):
         e = spread * generator.standard_normal(len(spread))
