@@ -157,9 +157,19 @@ def test_a_bias_that_is_not_declared_is_that_of_a_dense_step(small: bp.Experimen
     assert np.sqrt((ratio**2).mean()) > 2.0
 
 
-def test_a_plan_knows_what_they_leave(tmp_path: Path, disturbance: Disturbance) -> None:
+@pytest.mark.parametrize(
+    "name",
+    [
+        "probing, 0.3 µm",
+        "scale of each position",
+        "reproducibility of positions and probes",
+        pytest.param("probing, 0.1 µm", marks=pytest.mark.long),
+        pytest.param("reproducibility of positions and balls", marks=pytest.mark.long),
+    ],
+)
+def test_a_plan_knows_what_they_leave(name: str, tmp_path: Path) -> None:
     """Everything in the pool chosen is the design of all positions; its file reads again."""
-    told, settings = small_sections(20), disturbance.settings
+    told, settings = small_sections(20), EVERY[name].settings
     if settings["kind"] == "position scale":
         settings = settings | {"positions": ["z low", "x high", "y low"]}
     told["influences"] = [settings]
