@@ -39,7 +39,7 @@ def file_with(folder: Path, influences: list[dict[str, Any]] | None, **changed: 
     told = small_sections(20, true_machine={"kind": "zero"}, sigma="given")
     told |= {"influences": influences} if influences else {}
     path = folder / "file.yaml"
-    path.write_text(yaml.safe_dump(told | changed), encoding="utf-8")
+    path.write_text(yaml.safe_dump(told | changed, sort_keys=False), encoding="utf-8")
     return load(path)[0]
 
 
@@ -54,6 +54,14 @@ def plain(design: Design) -> Design:
     readings = replace(design.readings, beside=None)
     undisturbed = replace(design, influences=(), readings=readings)
     return undisturbed.observed(replace(given, **none, influence=None))
+
+
+def nominal_arms(design: Design) -> Real:
+    """From the centres of artefacts to the balls read (m, d), turned as the artefacts are."""
+    readings, state = design.readings, nominal_state(design)
+    return np.asarray(
+        np.einsum("mij,mj->mi", state.rotations[readings.position], state.balls[readings.ball])
+    )
 
 
 def dense_spread(design: Design, law: Law, spread: Real) -> tuple[dense.Spread, dense.Problem]:
@@ -103,8 +111,7 @@ def _campaigns(
     generator = np.random.default_rng(20261122)
     state, readings = nominal_state(design), design.readings
     p = state.probes[readings.probe]
-    arms = np.einsum("mij,mj->mi", state.rotations[readings.position], state.balls[readings.ball])
-    true = arms + state.origins[readings.position]
+    true = nominal_arms(design) + state.origins[readings.position]
     given = design.of(CalibratedDistances)
     for _ in range(count):
         e = spread * generator.standard_normal(len(spread))

@@ -12,7 +12,6 @@ import pytest
 import yaml
 from ballplate.rank.verdicts import verdict
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.estimation.functions import linear_functions
 from ballplate.simulator.estimation.gauss_newton import estimate
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
@@ -20,7 +19,6 @@ from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.readings.reading_files import read_readings, write_readings
 from ballplate.simulator.readings.simulated import simulated_readings
-from ballplate.uncertainty.quantities import QUANTITIES
 
 from tests.influences import wording
 from tests.influences.campaigns import (
@@ -94,25 +92,6 @@ def test_the_parameters_are_those_stated(tmp_path: Path) -> None:
         (wording.DRIFT_OF_SCALE, "1/h", 0.0, 1e-6),
     ]
     assert len(design.influence_parameters) == 5
-
-
-def test_every_uncertainty_is_that_of_the_dense_computation(drawn: Experiment) -> None:
-    design = lay_out(drawn)
-    (found, of), at = dense_spread(design, law, SPREAD), linearise(design)
-    assert at.deficiency == found.deficiency == 0
-    widened = {
-        symbol: found.of(np.pad(dense.jacobian(function, of.parameters), ((0, 0), (0, 4))))
-        for symbol, function in dense.quantities(of).items()
-    }
-    for symbol, expected in widened.items():
-        (functions,) = QUANTITIES[symbol].functions(design, at.layout)
-        values = at.uncertainty(linear_functions(at, functions))
-        np.testing.assert_allclose(values, expected, rtol=1e-6)
-    own = at.of_shared(np.eye(len(at.layout))[at.layout.influences])
-    np.testing.assert_allclose(own, np.sqrt(np.diag(found.covariance))[-4:], rtol=1e-6)
-    # Of no use if drift had no part in them.
-    without = dense.standard_uncertainties(of, symbols=["U6"])["U6"].mean()
-    assert widened["U6"].mean() > 1.01 * without
 
 
 UNKNOWN = {"kind": "drift", "axes": {}, "scale": {}}

@@ -14,20 +14,16 @@ import yaml
 from ballplate.cli import main
 from ballplate.rank.verdicts import verdict
 from ballplate.simulator.design.arrays import Design, influence_shifts, nominal_state
-from ballplate.simulator.estimation.functions import linear_functions
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.uncertainty.quantities import QUANTITIES
 
 from tests.influences.campaigns import (
     Real,
-    dense_spread,
     file_with,
 )
-from tests.reference import dense
 
 SAG = 2e-6
 SPREAD = np.array([SAG])
@@ -47,11 +43,6 @@ def law(design: Design, x: Any, e: Any, shape: Real = BOWL) -> Any:
     readings = design.readings
     share = np.where(flat[readings.position], shape[readings.ball], 0.0)
     return -e[0] * share[:, None] * np.array([0.0, 0.0, 1.0])
-
-
-@pytest.fixture(scope="module")
-def drawn(tmp_path_factory: pytest.TempPathFactory) -> Experiment:
-    return file_with(tmp_path_factory.mktemp("drawn"), [STATED])
 
 
 def small(
@@ -187,19 +178,6 @@ def test_the_verdict_tells_whether_sag_and_shape_are_told_apart(
     found = verdict(linearise(design))
     assert found.deficiency == more
     assert ("sag of plate" in "; ".join(map(str, found.null))) == (more > 0)
-
-
-def test_every_uncertainty_is_that_of_the_dense_computation(drawn: Experiment) -> None:
-    design = lay_out(drawn)
-    (found, of), at = dense_spread(design, law, SPREAD), linearise(design)
-    assert at.deficiency == found.deficiency == 0
-    for symbol, function in dense.quantities(of).items():
-        (functions,) = QUANTITIES[symbol].functions(design, at.layout)
-        expected = found.of(np.pad(dense.jacobian(function, of.parameters), ((0, 0), (0, 1))))
-        values = at.uncertainty(linear_functions(at, functions))
-        np.testing.assert_allclose(values, expected, rtol=1e-6)
-    own = at.of_shared(np.eye(len(at.layout))[at.layout.influences])
-    np.testing.assert_allclose(own, np.sqrt(found.covariance[-1, -1]), rtol=1e-6)
 
 
 def test_a_plan_weighs_the_sag_and_its_file_finds_the_values(tmp_path: Path) -> None:

@@ -4,7 +4,6 @@ physical model with all its products, in dense computations and in simulated cam
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,7 @@ import yaml
 from ballplate.cli import main
 from ballplate.estimators.estimator_choice import fit_readings
 from ballplate.rank.verdicts import verdict
-from ballplate.simulator.design.arrays import Design, nominal_state
+from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.functions import linear_functions
 from ballplate.simulator.estimation.gauss_newton import estimate
 from ballplate.simulator.estimation.linearisation import linearise
@@ -26,16 +25,14 @@ from ballplate.simulator.readings.observed_readings import observe
 from ballplate.simulator.readings.reading_files import read_readings, write_readings
 from ballplate.simulator.readings.simulated import simulated_readings
 from ballplate.uncertainty.quantities import QUANTITIES
-from numpy.typing import NDArray
 
 from tests.influences import wording
 from tests.influences.campaigns import (
+    dense_spread,
     file_with,
-    plain,
+    nominal_arms,
 )
-from tests.reference import dense
 
-Real = NDArray[np.float64]
 TOP = Path(__file__).parents[2]
 
 PLATE = {"value": 11.5e-6, "u": 0.6e-6}
@@ -98,56 +95,7 @@ def expanded(arms: Any, x: Any, position: Any, e: Any) -> Any:
 
 def law(design: Design, x: Any, e: Any) -> Any:
     """What they add where balls are as stated, with parameters e (16,) beside their values."""
-    state, readings = nominal_state(design), design.readings
-    arms = np.einsum("mij,mj->mi", state.rotations[readings.position], state.balls[readings.ball])
-    return expanded(arms, x, readings.position, EXPECTED + e)
-
-
-@dataclass(frozen=True)
-class Dense:
-    """The dense problem of a design with temperatures, as drawn; its last 16 parameters are
-    EXPECTED.
-    """
-
-    of: dense.Problem
-
-    def rows(self, step: Any) -> Any:
-        problem, readings = self.of, self.of.design.readings
-        inner = step[:-16]
-        found = dense.residuals(problem, inner)
-        balls, rotations, _, _ = dense.unpack(problem, inner)
-        arms = np.einsum("mij,mj->mi", rotations[readings.position], balls[readings.ball])
-        e = EXPECTED + step[-16:]
-        shift = expanded(arms, problem.scales, readings.position, e)
-        m = 3 * len(readings)
-        found[:m] = found[:m] - (shift / problem.design.machine.repeatability).ravel()
-        return np.concatenate([found, step[-16:] / SPREAD])
-
-    def spread(self) -> dense.Spread:
-        count = self.of.parameters + 16
-        return dense.spread(dense.jacobian(self.rows, count))
-
-
-def test_every_uncertainty_is_that_of_the_dense_computation(drawn: Experiment) -> None:
-    design = lay_out(drawn)
-    of = dense.planned(plain(design), 3, 3)
-    found, at = Dense(of).spread(), linearise(design)
-    assert at.deficiency == found.deficiency == 0
-    widened = {
-        symbol: found.of(np.pad(dense.jacobian(function, of.parameters), ((0, 0), (0, 16))))
-        for symbol, function in dense.quantities(of).items()
-    }
-    for symbol, expected in widened.items():
-        (functions,) = QUANTITIES[symbol].functions(design, at.layout)
-        # The program neglects derivatives of the shift by places, of 2e-5.
-        np.testing.assert_allclose(
-            at.uncertainty(linear_functions(at, functions)), expected, rtol=1e-4
-        )
-    own = at.of_shared(np.eye(len(at.layout))[at.layout.influences])
-    np.testing.assert_allclose(own, np.sqrt(np.diag(found.covariance))[-16:], rtol=1e-4)
-    # Of no use if temperatures had no part in them.
-    without = dense.standard_uncertainties(of, symbols=["U6"])["U6"].mean()
-    assert widened["U6"].mean() > 1.1 * without
+    return expanded(nominal_arms(design), x, design.readings.position, EXPECTED + e)
 
 
 def test_a_distance_is_as_uncertain_as_its_plate_expands(tmp_path: Path) -> None:
@@ -188,8 +136,6 @@ EXACT = {
     "scale_expansion": {"value": "8 um/m/K", "standard_uncertainty": "0 um/m/K"},
     "scale_temperature": {"value": "20.8 degC"},
 }
-
-
 UNKNOWN = {
     "artefact_expansion": {"value": "11.5 um/m/K"},
     "artefact_temperature": {"value": "21.5 degC"},
@@ -217,27 +163,17 @@ def test_the_verdict_tells_what_cannot_be_told_apart(
     design = lay_out(as_told(UNKNOWN | {"positions": places}, tmp_path))
     found = verdict(linearise(design))
     assert found.deficiency == deficiency
-    # The same of a dense Jacobian, by the law.
-    of = dense.planned(plain(design), 3, 3)
+    # The same of the law, in a dense computation.
     plates, scales = (
         np.array([20.0 + part.differences[k] for k in range(6)]) - 20.0
         for part in design.influences[0].parts  # type: ignore[attr-defined]
     )
-    readings = design.readings
-    m = 3 * len(readings)
 
-    def rows(step: Any) -> Any:
-        inner = step[:-2]
-        balls, rotations, _, _ = dense.unpack(of, inner)
-        arms = np.einsum("mij,mj->mi", rotations[readings.position], balls[readings.ball])
-        shift = step[-2] * plates[readings.position][:, None] * arms
-        shift = shift - step[-1] * scales[readings.position][:, None] * of.scales
-        found = dense.residuals(of, inner)
-        found[:m] = found[:m] - (shift / of.design.machine.repeatability).ravel()
-        return found
+    def expansions(of: Design, x: Any, e: Any) -> Any:
+        place = of.readings.position[:, None]
+        return e[0] * plates[place] * nominal_arms(of) - e[1] * scales[place] * x
 
-    count = of.parameters + 2
-    assert dense.spread(dense.jacobian(rows, count)).deficiency == deficiency
+    assert dense_spread(design, expansions, np.full(2, np.inf))[0].deficiency == deficiency
     told = "; ".join(map(str, found.null))
     assert (wording.EXPANSION_OF_THE_SCALES in told) == (deficiency > 0)
     assert ("expansion of plate" in told) == (deficiency > 1)

@@ -4,8 +4,6 @@ tests.robustness NUMBER`.
 
 from __future__ import annotations
 
-import shlex
-import shutil
 import sys
 import tempfile
 import traceback
@@ -14,20 +12,6 @@ from pathlib import Path
 from tests.robustness.cases import Case, case, lay_out, trial
 from tests.robustness.kit import make_kit
 from tests.robustness.worker import outcome
-
-
-def shortest(kit: Path, root: Path, one: Case, fault: str) -> tuple[str, ...]:
-    """The arguments of a case without those that the same fault does not need."""
-    needed = list(one.arguments)
-    for at in reversed(range(len(needed))):
-        fewer = Case(one.number, (*needed[:at], *needed[at + 1 :]), one.changes, one.contents)
-        folder = root / f"shorter-{one.number}-{at}"
-        lay_out(kit, fewer, folder)
-        found = tried(fewer, folder)
-        if found is not None and found.splitlines()[-1] == fault.splitlines()[-1]:
-            del needed[at]
-        shutil.rmtree(folder)
-    return tuple(needed)
 
 
 def tried(one: Case, folder: Path) -> str | None:
@@ -58,8 +42,7 @@ def main(numbers: list[str]) -> int:
                 f" error\n{err[:3000]}"
             )
         else:
-            line = shlex.join(("ballplate", *shortest(root / "kit", root, one, fault)))
-            print(f"fault:\n{fault}\nthe same by: {line}")
+            print(f"fault:\n{fault}")
         worst |= fault is not None
     return worst
 

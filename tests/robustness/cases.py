@@ -34,7 +34,6 @@ from tests.robustness.mutations import (
     vocabulary,
 )
 from tests.robustness.recipes import RECIPES
-from tests.robustness.stores import changed_store
 from tests.robustness.worker import CONTROL, FORM, outcome
 
 # Files that others name, and that are read with them.
@@ -144,19 +143,11 @@ def _of_file(random: Random, kit: Path, number: int, line: list[str], name: str)
         changes, content = changed_yaml(random, content, _tree(kit / name), _words(name))
     elif name.endswith(".csv"):
         changes, content = changed_table(random, content)
-    elif name.endswith(".sqlite"):
-        told, content = changed_store(random, content)
-        changes = [told]
     else:
         told, content = changed_text(random, content)
         changes = [told]
-    contents = [(name, content)]
-    if name.endswith(".sqlite") and random.random() < 0.05:
-        beside = name + random.choice(("-wal", "-journal"))
-        contents.append((beside, random.randbytes(random.choice((1, 32, 4152)))))
-        changes = [*changes, f"{beside} left behind"]
     return Case(
-        number, tuple(quick(line)), tuple(f"{name}: {one}" for one in changes), tuple(contents)
+        number, tuple(quick(line)), tuple(f"{name}: {one}" for one in changes), ((name, content),)
     )
 
 
@@ -180,10 +171,7 @@ WARM_UP = (
     "check --suggest --format junit deficient.yaml",
     "run small.yaml --trials 4 --seed 3 --workers 1",
     "plan pool.yaml --positions 2 --workers 1 --plot out.svg",
-    "sweep trials.yaml --workers 1",
     "'sweep --export' trials.sqlite -o out.parquet",
-    "'sweep --report' sweep.sqlite -o out.html",
-    "spline curve.csv --plot out.pdf",
 )
 
 

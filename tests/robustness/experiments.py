@@ -1,6 +1,4 @@
-"""Which files are changed, what is tried in them that they are not made for, and the commands that
-then read them.
-"""
+"""What is tried in files that they are not made for."""
 
 from __future__ import annotations
 
@@ -11,19 +9,9 @@ from ballplate.extensions.sweeps.sweep_schema import schema as sweep_schema
 from ballplate.simulator.experiment.json_schema import schema
 
 from tests.robustness.mutations import vocabulary
-from tests.robustness.worker import complaint
 
 SEED = 1
 FILES = Path(__file__).parent / "files"
-QUICKSTART = Path("designs/quickstart.yaml")
-SMALL = [
-    *Path("designs/hocken_borchardt").glob("*.yaml"),
-    *Path("designs/hurt_foss").glob("*.yaml"),
-]
-POOLED = Path("designs/planning/campaign.yaml")
-QUICK = [QUICKSTART, *sorted(SMALL), POOLED, *sorted(FILES.glob("*.yaml"))]
-# Those that are planned in no time are tried more often.
-EXPERIMENTS = [*sorted(Path("designs/npl").glob("*.yaml")), *5 * QUICK]
 
 SIZES = [
     "0 mm",
@@ -176,7 +164,6 @@ WILD: dict[str, list[Any]] = {
 }
 WORDS = vocabulary(schema(), WILD)
 
-SWEEPS = sorted((FILES / "sweeps").glob("*.yaml"))
 PATHS = [
     "seed",
     "positions",
@@ -261,34 +248,3 @@ SWEEP_WORDS = vocabulary(
         ],
     },
 )
-
-
-def _json(path: Path) -> list[str]:
-    return ["--json"] if path.stat().st_size % 2 else []
-
-
-def check(path: Path) -> str | None:
-    """What is wrong with what `ballplate check` makes of a file."""
-    return complaint(["check", *_json(path), str(path)], path.parent)
-
-
-def run(path: Path) -> str | None:
-    """What is wrong with what `ballplate run` makes of a file."""
-    return complaint(["run", *_json(path), str(path)], path.parent)
-
-
-def simulate(path: Path) -> str | None:
-    """What is wrong with the readings that `ballplate simulate` makes of a file."""
-    return complaint(["simulate", str(path), "-o", "-"], path.parent)
-
-
-def fit(path: Path) -> str | None:
-    """What is wrong with what `ballplate fit` makes of a table of readings, the experiment's file
-    beside it.
-    """
-    return complaint(["fit", *_json(path), str(path.with_suffix(".yaml")), str(path)], path.parent)
-
-
-def sweep(path: Path) -> str | None:
-    """What is wrong with what `ballplate sweep --dry-run` makes of a file."""
-    return complaint(["sweep", "--dry-run", "--workers", "1", str(path)], path.parent)

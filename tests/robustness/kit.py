@@ -6,10 +6,14 @@ Each case is tried in a copy of it of its own.
 
 from __future__ import annotations
 
+import atexit
 import os
+import shutil
 import sqlite3
+import tempfile
 from collections.abc import Callable
 from contextlib import closing
+from functools import cache
 from pathlib import Path
 
 from tests.reference.copies import copy_file, copy_tree
@@ -113,6 +117,16 @@ READINGS_OF = ("small", "tables", "splines", "bar-bell", "bryan-gauge", "dummy",
 
 def make_kit(folder: Path) -> None:
     """Fill an empty folder."""
+    copy_tree(_made(), folder, dirs_exist_ok=True)
+    (folder / "loop.csv").symlink_to("loop.csv")
+    os.mkfifo(folder / "pipe.csv")
+
+
+@cache
+def _made() -> Path:
+    """The regular files, made once by each process."""
+    folder = Path(tempfile.mkdtemp(prefix="ballplate-kit-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
     for source in (*FILES.glob("*.csv"), *FILES.glob("*.yaml"), *(FILES / "sweeps").glob("*.yaml")):
         copy_file(source, folder)
     copied = (
@@ -149,8 +163,7 @@ def make_kit(folder: Path) -> None:
     (folder / "folder").mkdir()
     for suffix in (".csv", ".yaml", ".svg", ".html"):
         (folder / f"old{suffix}").write_text("something that was there before\n", encoding="utf-8")
-    (folder / "loop.csv").symlink_to("loop.csv")
-    os.mkfifo(folder / "pipe.csv")
+    return folder
 
 
 def _all_but(*beginnings: str) -> Callable[[str, list[str]], list[str]]:

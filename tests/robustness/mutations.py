@@ -1,35 +1,17 @@
-"""Mutants of YAML files: the same numbers give the same mutants, whatever the files are.
-
-A mutant has one to three changes, either of the text (lines, characters, bytes) or of the tree that
-the text means.
+"""Changes of YAML files and tables: one to three, either of the text (lines, characters, bytes) or
+of the tree that the text means, drawn at random.
 """
 
 from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cache
-from pathlib import Path
 from random import Random
 from typing import Any
 
 import yaml
-from hypothesis import strategies as st
-
-
-@dataclass(frozen=True)
-class Mutant:
-    """A changed file: which it was, what was done to it, and what it has become."""
-
-    origin: Path
-    number: int
-    changes: tuple[str, ...]
-    content: bytes
-
-    def __str__(self) -> str:
-        return f"mutant {self.number} of {self.origin} ({', '.join(self.changes)})"
 
 
 @dataclass(frozen=True)
@@ -429,26 +411,9 @@ def changed_text(random: Random, content: bytes) -> tuple[str, bytes]:
     return name, TEXT_CHANGES[name](random, content)
 
 
-@cache
-def _read(path: Path) -> tuple[bytes, str]:
-    content = path.read_bytes()
-    return content, tree_of(content)
-
-
 def tree_of(content: bytes) -> str:
     """What a YAML file means, as JSON."""
     return json.dumps(yaml.load(content, Loader=yaml.SafeLoader), default=str)
-
-
-def mutant(files: Sequence[Path], words: Vocabulary, seed: int, number: int) -> Mutant:
-    """One mutant of one of the files; of several variants, trees keep one at most, which saves
-    time.
-    """
-    random = Random(f"{seed}-{number}")
-    origin = random.choice(files)
-    content, tree_text = _read(origin)
-    changes, content = changed_yaml(random, content, tree_text, words)
-    return Mutant(origin, number, tuple(changes), content)
 
 
 def changed_yaml(
@@ -479,14 +444,6 @@ def changed_yaml(
             name, content = changed_text(random, content)
             changes.append(name)
     return changes, content
-
-
-def mutants(
-    files: Sequence[Path], words: Vocabulary, seed: int, numbers: range
-) -> Iterator[Mutant]:
-    """Mutants of the files, one for each number."""
-    for number in numbers:
-        yield mutant(files, words, seed, number)
 
 
 def _by_cells(
@@ -632,15 +589,6 @@ TABLE_CHANGES: dict[str, Callable[[Random, bytes], bytes]] = {
 MOST_BYTES = 20_000_000
 
 
-def table_mutants(tables: Sequence[Path], seed: int, numbers: range) -> Iterator[Mutant]:
-    """Mutants of comma-separated tables, one for each number."""
-    for number in numbers:
-        random = Random(f"{seed}-{number}")
-        origin = random.choice(tables)
-        changes, content = changed_table(random, origin.read_bytes())
-        yield Mutant(origin, number, tuple(changes), content)
-
-
 def changed_table(random: Random, content: bytes) -> tuple[list[str], bytes]:
     """A comma-separated table with one change or two, and what these are."""
     changes = list[str]()
@@ -649,29 +597,3 @@ def changed_table(random: Random, content: bytes) -> tuple[list[str], bytes]:
         changes.append(random.choice(list(every)))
         content = every[changes[-1]](random, content)[:MOST_BYTES]
     return changes, content
-
-
-def trees(words: Vocabulary) -> st.SearchStrategy[Any]:
-    """Trees of any form with the keys of the format, for Hypothesis."""
-    scalars = st.one_of(
-        st.sampled_from([one for one in SCALARS if not isinstance(one, Raw)]),
-        st.sampled_from(words.words or ("a",)),
-        st.integers(),
-        st.floats(),
-        st.text(max_size=20),
-        st.builds(
-            "{} {}".format,
-            st.integers(-5, 2000),
-            st.sampled_from(("mm", "m", "um", "deg", "urad", "ppm")),
-        ),
-        *(st.sampled_from(values) for _, values in words.wild),
-    )
-    keys = st.one_of(st.sampled_from(words.keys or ("a",)), st.text(max_size=5))
-    below = st.recursive(
-        scalars,
-        lambda inner: st.one_of(
-            st.lists(inner, max_size=5), st.dictionaries(keys, inner, max_size=5)
-        ),
-        max_leaves=30,
-    )
-    return st.dictionaries(st.sampled_from(words.keys or ("a",)), below, max_size=10)

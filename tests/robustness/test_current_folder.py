@@ -34,16 +34,32 @@ NAMES = sorted(
 CANARY = "open({ran!r}, 'a').write('{name} ')\nraise ImportError('the canary {name}')\n"
 # Of each command what it does first, by several processes where it can.
 FIRST = {line.partition(" ")[0]: line for line in reversed(RECIPES) if "dry-run" not in line}
-COMMANDS = (
+LINES = (
     *FIRST.values(),
-    "run small.yaml --trials 600 --seed 3 --workers 2",
-    "plan pool.yaml --hours 2 --curve --workers 2",
-    "sweep trials.yaml --workers 2 --store new.sqlite",
-    "sweep own.yaml --workers 2",
-    "run own-model.yaml --trials 600 --workers 2",
     "run small.yaml --report out.html",
     "map machine.yaml --grid 2,2,2 --plot out.svg",
 )
+# With several processes.
+COMMANDS = (
+    "plan pool.yaml --hours 2 --curve --workers 2",
+    "sweep own.yaml --workers 2",
+    "run own-model.yaml --trials 600 --workers 2",
+)
+# Every command, one after the other in one process: what any of them loads shows.
+ALL = """
+import shlex, sys
+from pathlib import Path
+from ballplate.cli import main
+
+for line in LINES:
+    for path in Path().glob("out.*"):
+        path.unlink()
+    try:
+        status = main(shlex.split(line))
+    except SystemExit as left:
+        status = left.code
+    assert status in (0, 1), line
+"""
 # In Python, in which a folder of its own comes first: the methods by which processes are started.
 IN_PYTHON = """
 import multiprocessing, sys, time
@@ -140,12 +156,15 @@ def assert_nothing_ran(done: subprocess.CompletedProcess[str], folder: Path) -> 
     assert done.returncode in (0, 1), done.stderr
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("line", COMMANDS)
-def test_no_command_runs_files_of_the_current_folder(
-    line: str, folder: Path, tmp_path: Path
-) -> None:
+def test_no_process_of_a_command_runs_files_of_the_current_folder(line: str, folder: Path) -> None:
     assert_nothing_ran(by_its_name(folder, line), folder)
+
+
+def test_no_command_runs_files_of_the_current_folder(folder: Path, tmp_path: Path) -> None:
+    program = tmp_path / "program.py"
+    program.write_text(ALL.replace("LINES", repr(LINES)))
+    assert_nothing_ran(outcome(folder, str(program)), folder)
 
 
 @pytest.fixture(scope="module")

@@ -81,7 +81,6 @@ COMMANDS = (
     "map --curves map.yaml",
     "map map.yaml",
     "diff map.yaml map.yaml",
-    "sweep s.yaml",
     "sweep s.yaml --workers 2",
 )
 number = count()
@@ -206,7 +205,7 @@ AT_ONCE = {
 
 
 @pytest.mark.parametrize("way", AT_ONCE)
-@pytest.mark.parametrize("at", [1, 10, 21, 30, 40, 50, 61, 75, 100])
+@pytest.mark.parametrize("at", [1, 21, 50, 100])
 def test_a_call_that_goes_wrong_later_is_told(
     at: int,
     way: str,

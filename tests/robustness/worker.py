@@ -17,7 +17,6 @@ from contextlib import chdir, redirect_stderr, redirect_stdout
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
-from unicodedata import category
 
 Trial = Callable[[Any], str | None]
 """Tries a file, or a command, and says what is wrong with what came of it, None where nothing
@@ -56,28 +55,6 @@ def outcome(arguments: Sequence[str], folder: Path = Path()) -> tuple[int, str, 
     out.flush()
     err.flush()
     return status, *(stream.buffer.getvalue().decode() for stream in (out, err))  # type: ignore[attr-defined,return-value]
-
-
-def complaint(arguments: Sequence[str], files: Path) -> str | None:
-    """What is wrong with what a command makes of files, all of which are in one folder."""
-    status, out, err = outcome(arguments)
-    if status in (0, 1):
-        return None if out.strip() else f"status {status}, but nothing is said"
-    if status != 3:
-        return f"status {status}: {err[-2000:]}"
-    if out and arguments[0] != "run":
-        return f"status 3 with output: {out[:500]}"
-    # Every kind of line end counts.
-    lines = err.splitlines()
-    form = re.compile(re.escape(str(files)) + FORM)
-    ill = [
-        line
-        for line in lines
-        if not form.fullmatch(line) or any(category(letter) in CONTROL for letter in line)
-    ]
-    if not lines:
-        return "status 3, and no error"
-    return f"not in the stated form: {ill[0][:600]!r}" if ill else None
 
 
 def _serve(connection: Connection, trial: Trial, memory: int) -> None:

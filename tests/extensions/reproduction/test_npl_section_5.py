@@ -25,7 +25,6 @@ from ballplate.extensions.reproduction.shipped import (
 from ballplate.rank.verdicts import Verdict
 from ballplate.results.checked_designs import check
 from ballplate.results.fits import Fit
-from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 
 # The tests below look at few fits, each of which is computed once.
@@ -52,7 +51,21 @@ def steps(found: Fit) -> list[float]:
     return [iteration.step for iteration in found.solution.iterations[1:]]
 
 
-@pytest.mark.parametrize("published", npl().convergence, ids=lambda published: published.design)
+# Those whose fits take seconds are left to the long tests.
+QUICK = ("5.2", "5.3[empirical fit]", "5.4[kinematic machine, kinematic fit]")
+
+
+@pytest.mark.parametrize(
+    "published",
+    [
+        pytest.param(
+            one,
+            id=one.design,
+            marks=[] if one.design.startswith(QUICK) else [pytest.mark.long],
+        )
+        for one in npl().convergence
+    ],
+)
 def test_published_iterations(published, monkeypatch: pytest.MonkeyPatch) -> None:  # type: ignore[no-untyped-def]
     monkeypatch.setattr(compare, "fitted_exactly", fitted_once)
     found = compare_iterations(npl(), SHIPPED, published)
@@ -83,6 +96,7 @@ def test_a_fit_that_contains_the_machine_converges_in_three_iterations(
     assert at_last < 1e-22
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "variant"), [("5.3", "kinematic fit"), ("5.4", "empirical machine, kinematic fit")]
 )
@@ -111,15 +125,15 @@ NAMED = re.compile(r"E[XYZABC] \((error in|rotation about) [XYZ], .*along [XYZ] 
 
 def test_an_empirical_fit_of_sparse_readings_is_recognised_as_deficient() -> None:
     """Section 5.4: planned, on a machine without errors, twelve directions are wholly open."""
-    for experiment in load(Path("designs/npl/5.4.yaml")):
-        verdict = planned(experiment.label)
-        assert verdict.as_expected
-        if experiment.name is not None and experiment.name.endswith("empirical fit"):
-            assert verdict.deficiency == len(verdict.null) == 12 and verdict.gap > 1e8
-            assert all(NAMED.search(str(direction)) for direction in verdict.null)
+    verdict = planned("5.4[kinematic machine, empirical fit]")
+    assert verdict.as_expected
+    assert verdict.deficiency == len(verdict.null) == 12 and verdict.gap > 1e8
+    assert all(NAMED.search(str(direction)) for direction in verdict.null)
 
 
-@pytest.mark.parametrize("machine", ["kinematic", "empirical"])
+@pytest.mark.parametrize(
+    "machine", ["kinematic", pytest.param("empirical", marks=pytest.mark.long)]
+)
 def test_what_the_sparse_readings_leave_open_is_named_after_a_fit_too(machine: str) -> None:
     """Tables 3 and 4: steps that stay at 1e-3. The machine's errors tilt the twelve open directions
     just so much out of the way that they are seen through products of errors; the iteration wanders

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import csv
-import json
 from pathlib import Path
 
 import ballplate as bp
 import numpy as np
 import pytest
-from ballplate.cli import main
 from ballplate.extensions.splines.error_curve import ErrorCurve
 from ballplate.simulator.splines.polynomial_pieces import pieces
 
@@ -116,22 +114,28 @@ def test_dome_and_linear_feature_are_fitted_at_once() -> None:
     assert level.free == curve.fit.free - 1 and level.sum_of_squares > curve.fit.sum_of_squares
 
 
-@pytest.mark.parametrize("variant", ["joined", "level ends", "cyclic"])
+SMALL = {"artefacts.plate.balls": [6, 6], "evaluation.points": {"random": 10, "seed": 1}}
+VARIANTS = ("joined", "level ends", "cyclic")
+
+
+@pytest.mark.parametrize(
+    ("variant", "changes"),
+    [
+        ("cyclic", SMALL),
+        *(pytest.param(variant, {}, marks=pytest.mark.long) for variant in VARIANTS),
+    ],
+)
 def test_the_shipped_experiment_recovers_its_machine(
-    variant: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    variant: str, changes: dict[str, object]
 ) -> None:
     """Readings without noise come out again, and the joint of the scales shows in a model that is
     smooth across it.
     """
-    file, readings = "designs/gilsinn/scales-in-two-parts.yaml", tmp_path / "readings.csv"
-    assert main(["simulate", file, "--variant", variant, "--exact", "-o", str(readings)]) == 0
-    squares = {}
-    for fitted in (variant, "smooth"):
-        assert (
-            main(["fit", file, str(readings), "--variant", fitted, "--sigma", "given", "--json"])
-            == 0
-        )
-        found = json.loads(capsys.readouterr().out)
-        squares[fitted] = found["sum_of_squares"]
-    assert squares[variant] < 1e-9
-    assert squares["smooth"] > 100
+    own, smooth = (
+        bp.load("designs/gilsinn/scales-in-two-parts.yaml", one).with_(changes)
+        for one in (variant, "smooth")
+    )
+    readings = bp.simulate(own, exact=True)
+    exact, off = (bp.fit(one, readings, sigma="given") for one in (own, smooth))
+    assert exact.to_dict()["sum_of_squares"] < 1e-9
+    assert off.to_dict()["sum_of_squares"] > 100
