@@ -9,10 +9,15 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
+from ballplate.designs import shipped
 
 from tests.extensions.pages.browser import program
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
 
 pytest.importorskip("starlette", reason="the studio is an extra")
 INSTALL = "python -m pip install 'ballplate[test,browser]', and a Chromium"
@@ -31,10 +36,17 @@ FLAGS = (
 )
 
 
+TEXT = Path(shipped("quickstart.yaml")).read_text(encoding="utf-8")
+SMALL = TEXT.replace("[5, 5]", "[3, 3]").replace("coefficients: 5", "coefficients: 3")
+SMALL = SMALL.replace("random: 200", "random: 20")
+"""The quickstart with fewer balls, coefficients and lengths."""
+
+
 class Studio:
     """A studio in a process of its own; `address` has its token."""
 
     def __init__(self, design: Path, port: int = 0) -> None:
+        self.design = design
         command = [sys.executable, "-m", "ballplate", "studio", str(design), "--no-browser"]
         self.process = subprocess.Popen(
             [*command, "--port", str(port)],
@@ -82,33 +94,60 @@ IN_BROWSER = (
 
 
 @contextmanager
-def tab(width: int = 1400, height: int = 900, touches: bool = False) -> Iterator:
-    """A tab of a browser, on a touch screen or not, with `errors`, what went wrong in it, and
-    `asked`, all requests.
-    """
+def chrome() -> Iterator[Browser]:
+    """A browser without a tab."""
     from playwright.sync_api import sync_playwright
 
     path = chromium()
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=path, args=list(FLAGS))
-        size = {"width": width, "height": height}
-        page = browser.new_context(viewport=size, has_touch=touches).new_page()
-        page.errors, page.asked = [], []
-        page.on("pageerror", lambda error: page.errors.append(str(error)))
-        page.on(
-            "console",
-            lambda said: page.errors.append(said.text) if said.type == "error" else None,
-        )
-        page.on("request", lambda request: page.asked.append(request.url))
-        page.set_default_timeout(60_000)
-        yield page
+        yield browser
         browser.close()
+
+
+@contextmanager
+def new_tab(browser: Browser, width: int = 1400, height: int = 900) -> Iterator:
+    """A tab of a browser with `errors`, what went wrong in it, and `asked`, all requests."""
+    context = browser.new_context(viewport={"width": width, "height": height})
+    page = context.new_page()
+    page.errors, page.asked, page.before = [], [], 0
+    page.on("pageerror", lambda error: page.errors.append(str(error)))
+    page.on(
+        "console",
+        lambda said: page.errors.append(said.text) if said.type == "error" else None,
+    )
+    page.on("request", lambda request: page.asked.append(request.url))
+    page.set_default_timeout(60_000)
+    yield page
+    context.close()
+
+
+@contextmanager
+def tab(width: int = 1400, height: int = 900) -> Iterator:
+    """A tab of a browser of its own."""
+    with chrome() as browser, new_tab(browser, width, height) as page:
+        yield page
 
 
 def opened(page, studio: Studio) -> None:
     """Open a studio's page, and wait for its design with its figures."""
     page.goto(studio.address)
     until(page, "!!window.studio?.state()?.design && !window.studio.state().pending")
+
+
+def opened_anew(page, studio: Studio) -> None:
+    """Open a studio's page with the text of its file and no computation, whatever an earlier test
+    has done; revisions that are waited for count from here.
+    """
+    home, asks = studio.address.partition("?")[0], page.request
+    asks.get(studio.address)
+    for job in asks.get(f"{home}api/jobs").json():
+        asks.post(f"{home}api/stop", data={"id": job["id"]})
+    text = studio.design.read_text("utf-8")
+    if asks.get(f"{home}api/state").json()["text"] != text:
+        asks.post(f"{home}api/do", data={"do": "text", "text": text})
+    opened(page, studio)
+    page.before = page.evaluate("window.studio.state().revision")
 
 
 def until(page, expression: str, seconds: float = 60.0) -> None:
@@ -120,7 +159,8 @@ def until(page, expression: str, seconds: float = 60.0) -> None:
 
 
 def settled(page, revision: int) -> dict:
-    """The state when the design has reached a revision, with its figures."""
+    """The state when the design has been changed so many times, with its figures."""
+    revision += page.before
     until(page, f"window.studio?.state()?.revision >= {revision} && !window.studio.state().pending")
     return page.evaluate("window.studio.state()")
 
