@@ -1,15 +1,18 @@
-"""The page in a browser: it opens without errors, asks no network for anything, and fits small
-screens.
+"""Pages of a sweep, a fit and a design in a browser: they open without errors, ask no network for
+anything, and fit small screens.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
 
+import ballplate as bp
 import pytest
+from ballplate.extensions.pages.design_contents import page_of_design
 
 from tests.extensions.pages import wording
 from tests.extensions.pages.browser import assert_quiet, browser, program
+from tests.extensions.pages.test_result_pages import CHANGED, small
 
 CHROMIUM = program()
 
@@ -36,13 +39,18 @@ CUT = """[...document.querySelectorAll('svg')].flatMap(svg => {
 })"""
 
 
-def test_page_opens_alone(plate_sizes_page: Path, tmp_path: Path) -> None:
+def test_pages_open_alone(plate_sizes_page: Path, tmp_path: Path) -> None:
     assert CHROMIUM is not None
+    experiment = small(**CHANGED["deficient"])
+    design, fit = tmp_path / "design.html", tmp_path / "fit.html"
+    design.write_text(page_of_design(experiment, bp.run(experiment)), encoding="utf-8")
+    bp.fit(small(), bp.simulate(small(), seed=1)).report(fit)
     with browser(CHROMIUM, tmp_path) as tab:
-        for width in (360, 400, 900, 1400):
-            tab.resize(width)
-            tab.open(plate_sizes_page)
-            assert tab.value(OUTSIDE) == [] and tab.value(CUT) == []
+        for page in (fit, design, plate_sizes_page):
+            tab.open(page)
+            for width in (360, 900, 1400):
+                tab.resize(width)
+                assert tab.value(OUTSIDE) == [] and tab.value(CUT) == [], (page, width)
         assert tab.value("document.title") == wording.SIZE_OF_THE_PLATE_AND_NUMBER
         assert tab.value("document.querySelectorAll('figure').length") == 2
         assert (

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-from ballplate.designs import shipped
 
 from tests.extensions.pages.browser import program
 
@@ -34,12 +33,6 @@ FLAGS = (
     "--enable-unsafe-swiftshader",
     "--use-angle=swiftshader",
 )
-
-
-TEXT = Path(shipped("quickstart.yaml")).read_text(encoding="utf-8")
-SMALL = TEXT.replace("[5, 5]", "[3, 3]").replace("coefficients: 5", "coefficients: 3")
-SMALL = SMALL.replace("random: 200", "random: 20")
-"""The quickstart with fewer balls, coefficients and lengths."""
 
 
 class Studio:

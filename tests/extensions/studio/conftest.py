@@ -21,7 +21,8 @@ def browser() -> Iterator:
 
 @pytest.fixture(scope="module")
 def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator:
-    from tests.extensions.studio.chromium import SMALL, Studio
+    from tests.extensions.studio.chromium import Studio
+    from tests.extensions.studio.small import SMALL
 
     path = tmp_path_factory.mktemp("studio") / "plate.yaml"
     path.write_text(SMALL, encoding="utf-8")

@@ -12,15 +12,8 @@ import ballplate as bp
 import pytest
 
 from tests.extensions.studio import wording
-from tests.extensions.studio.chromium import (
-    IN_BROWSER,
-    SMALL,
-    Studio,
-    new_tab,
-    settled,
-    spot,
-    until,
-)
+from tests.extensions.studio.chromium import IN_BROWSER, Studio, new_tab, settled, spot, until
+from tests.extensions.studio.small import SMALL
 
 pytestmark = [*IN_BROWSER, pytest.mark.slow]
 
@@ -67,11 +60,8 @@ def test_an_hour(browser, few: Path) -> None:
         page.wait_for_selector("[data-motion='0'][aria-pressed='true']")
         until(page, "!!window.studio.view.motions")
         drawn = "document.querySelector('#view').innerHTML"
-        pictures = set()
-        for _ in range(3):
-            pictures.add(page.evaluate(drawn))
-            page.wait_for_timeout(400)
-        assert len(pictures) == 3
+        page.evaluate("window.drawn = " + drawn)
+        until(page, f"window.drawn !== {drawn}")
         # And rests when it is stopped.
         page.click("[data-motion='0']")
         until(page, "!window.studio.view.motions && !window.studio.view.next")
@@ -244,14 +234,15 @@ def test_pages_fit_small_screens(browser, page, tmp_path: Path) -> None:
         summary.click()
     for width in (400, 900):
         page.set_viewport_size({"width": width, "height": 900})
-        assert page.evaluate(OUTSIDE) == []
+        until(page, f"({OUTSIDE}).length === 0")
     (tmp_path / "a file of a rather long name for a button of the first page.yaml").touch()
     with Studio(tmp_path / "new.yaml") as studio, new_tab(browser) as first:
         first.goto(studio.address)
         first.wait_for_selector("#draft dl")
         for width in (390, 1024):
             first.set_viewport_size({"width": width, "height": 900})
-            assert first.evaluate(OUTSIDE) == [] and first.errors == []
+            until(first, f"({OUTSIDE}).length === 0")
+        assert first.errors == []
 
 
 def test_results_of_an_earlier_design_are_marked_and_a_refused_sweep_says_where(page) -> None:
