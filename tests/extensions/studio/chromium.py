@@ -1,4 +1,4 @@
-"""A studio and a Chromium that Playwright drives, for the tests."""
+"""A studio in a process of its own and its page in a browser, for the tests."""
 
 from __future__ import annotations
 
@@ -6,33 +6,11 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import pytest
 
-from tests.extensions.pages.browser import program
-
-if TYPE_CHECKING:
-    from playwright.sync_api import Browser
-
 pytest.importorskip("starlette", reason="the studio is an extra")
-INSTALL = "python -m pip install 'ballplate[test,browser]', and a Chromium"
-pytest.importorskip("playwright", reason=f"no browser is driven without it: {INSTALL}")
-
-# A picture in three dimensions without a graphics card.
-FLAGS = (
-    "--no-sandbox",
-    "--no-first-run",
-    "--disable-quic",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--enable-unsafe-swiftshader",
-    "--use-angle=swiftshader",
-)
 
 
 class Studio:
@@ -68,60 +46,6 @@ class Studio:
         self.process.stdout.close()
 
 
-def chromium() -> str | None:
-    """The Chromium of this machine, or the one that Playwright has fetched."""
-    from playwright.sync_api import sync_playwright
-
-    if found := program():
-        return found
-    with sync_playwright() as playwright:
-        fetched = playwright.chromium.executable_path
-    return fetched if Path(fetched).exists() else None
-
-
-IN_BROWSER = (
-    pytest.mark.browser,
-    pytest.mark.skipif(chromium() is None, reason=f"no Chromium on this machine: {INSTALL}"),
-)
-"""Marks of tests that need a browser."""
-
-
-@contextmanager
-def chrome() -> Iterator[Browser]:
-    """A browser without a tab."""
-    from playwright.sync_api import sync_playwright
-
-    path = chromium()
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=list(FLAGS))
-        yield browser
-        browser.close()
-
-
-@contextmanager
-def new_tab(browser: Browser, width: int = 1400, height: int = 900) -> Iterator:
-    """A tab of a browser with `errors`, what went wrong in it, and `asked`, all requests."""
-    context = browser.new_context(viewport={"width": width, "height": height})
-    page = context.new_page()
-    page.errors, page.asked, page.before = [], [], 0
-    page.on("pageerror", lambda error: page.errors.append(str(error)))
-    page.on(
-        "console",
-        lambda said: page.errors.append(said.text) if said.type == "error" else None,
-    )
-    page.on("request", lambda request: page.asked.append(request.url))
-    page.set_default_timeout(60_000)
-    yield page
-    context.close()
-
-
-@contextmanager
-def tab(width: int = 1400, height: int = 900) -> Iterator:
-    """A tab of a browser of its own."""
-    with chrome() as browser, new_tab(browser, width, height) as page:
-        yield page
-
-
 def opened(page, studio: Studio) -> None:
     """Open a studio's page, and wait for its design with its figures."""
     page.goto(studio.address)
@@ -153,7 +77,7 @@ def until(page, expression: str, seconds: float = 60.0) -> None:
 
 def settled(page, revision: int) -> dict:
     """The state when the design has been changed so many times, with its figures."""
-    revision += page.before
+    revision += getattr(page, "before", 0)
     until(page, f"window.studio?.state()?.revision >= {revision} && !window.studio.state().pending")
     return page.evaluate("window.studio.state()")
 

@@ -13,7 +13,7 @@ def patient(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator:
-    from tests.extensions.studio.chromium import chrome
+    from tests.extensions.pages.browser import chrome
 
     with chrome() as found:
         yield found
@@ -33,7 +33,8 @@ def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator:
 @pytest.fixture
 def page(browser, studio) -> Iterator:
     """A new tab with the small quickstart."""
-    from tests.extensions.studio.chromium import new_tab, opened_anew
+    from tests.extensions.pages.browser import new_tab
+    from tests.extensions.studio.chromium import opened_anew
 
     with new_tab(browser) as found:
         opened_anew(found, studio)

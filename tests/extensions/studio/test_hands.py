@@ -6,7 +6,8 @@ from __future__ import annotations
 
 import pytest
 
-from tests.extensions.studio.chromium import IN_BROWSER, settled, spot, until
+from tests.extensions.pages.browser import IN_BROWSER
+from tests.extensions.studio.chromium import settled, spot, until
 
 pytestmark = [*IN_BROWSER, pytest.mark.slow]
 

@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.extensions.studio.chromium import IN_BROWSER, settled, until
+from tests.extensions.pages.browser import IN_BROWSER
+from tests.extensions.studio.chromium import settled, until
 
 pytestmark = [*IN_BROWSER, pytest.mark.slow]
 

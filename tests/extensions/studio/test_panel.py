@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.extensions.studio.chromium import IN_BROWSER, Studio, new_tab, settled, until
+from tests.extensions.pages.browser import IN_BROWSER, new_tab
+from tests.extensions.studio.chromium import Studio, settled, until
 from tests.extensions.studio.small import SMALL
 
 pytestmark = [*IN_BROWSER, pytest.mark.slow]

@@ -11,8 +11,9 @@ from pathlib import Path
 import ballplate as bp
 import pytest
 
+from tests.extensions.pages.browser import IN_BROWSER, new_tab
 from tests.extensions.studio import wording
-from tests.extensions.studio.chromium import IN_BROWSER, Studio, new_tab, settled, spot, until
+from tests.extensions.studio.chromium import Studio, settled, spot, until
 from tests.extensions.studio.small import SMALL
 
 pytestmark = [*IN_BROWSER, pytest.mark.slow]
