@@ -12,8 +12,8 @@ import ballplate as bp
 from ballplate.extensions.pages.design_contents import page_of_design
 from PIL import Image
 
+from tests.extensions.pages.browser import tab
 from tests.extensions.studio import pictures as of_studio
-from tests.extensions.studio.chromium import tab
 
 # Height of each picture of a page, and the element that it begins with.
 SHOWN = {

@@ -21,7 +21,17 @@ LAST_ANSWERS = 1
 
 
 class _Server(uvicorn.Server):
-    """A server that leaves signals to the command."""
+    """A server that leaves signals to the command, and asks it several times a second whether one
+    came: what an answer raises, KeyboardInterrupt too, uvicorn takes for a failure of that answer.
+    """
+
+    def __init__(self, config: uvicorn.Config, answer: Callable[[], None]) -> None:
+        super().__init__(config)
+        self._answer = answer
+
+    async def on_tick(self, counter: int) -> bool:
+        self._answer()
+        return await super().on_tick(counter)
 
     @contextmanager
     def capture_signals(self) -> Iterator[None]:
@@ -34,8 +44,11 @@ def _is_error(record: logging.LogRecord) -> bool:
     return not isinstance(error, asyncio.CancelledError | KeyboardInterrupt)
 
 
-def serve(session: Session, port: int, tell: Callable[[str], None]) -> None:
-    """Serve a session until the command is interrupted; `tell` receives the address to open.
+def serve(
+    session: Session, port: int, tell: Callable[[str], None], answer: Callable[[], None]
+) -> None:
+    """Serve a session until the command is interrupted; `tell` receives the address to open, and
+    `answer` raises KeyboardInterrupt after a signal.
 
     Port 0 is any free one.
 
@@ -62,6 +75,6 @@ def serve(session: Session, port: int, tell: Callable[[str], None]) -> None:
         logging.getLogger("uvicorn.error").addFilter(_is_error)
         tell(f"http://{ADDRESS}:{number}/?token={token}")
         try:
-            _Server(config).run(sockets=[listener])
+            _Server(config, answer).run(sockets=[listener])
         finally:
             session.close()

@@ -88,7 +88,7 @@ def run(options: Namespace) -> int:
 
     options.interruption.kept = lambda: unsaved(session)
     try:
-        serve(session, options.port, tell)
+        serve(session, options.port, tell, options.interruption.answer)
     except OSError as error:
         reason = error.strerror or str(error)
         raise UsageError(f"port {options.port} cannot be had: {reason}; name another") from None

@@ -103,7 +103,7 @@ def agree(path: Path) -> tuple[int, int]:
     return int(frame.notna().to_numpy().sum()), int(found.undetermined_without.sum())
 
 
-@pytest.mark.parametrize("first", [0, 10, 20])
+@pytest.mark.parametrize("first", [0, *(pytest.param(k, marks=pytest.mark.long) for k in (10, 20))])
 def test_information_is_that_of_a_dense_deletion(first: int, tmp_path: Path) -> None:
     """Of designs most of which leave errors undetermined, and of some of full rank."""
     cells = [agree(random_file(seed, tmp_path)) for seed in range(first, first + 8)]

@@ -1,25 +1,19 @@
-"""The page in a browser: it opens without errors, asks no network for anything, and fits small
-screens.
+"""Pages of a sweep, a fit and a design in a browser: they open without errors, ask no network for
+anything, and fit small screens.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
 
-import pytest
+import ballplate as bp
+from ballplate.extensions.pages.design_contents import page_of_design
 
 from tests.extensions.pages import wording
-from tests.extensions.pages.browser import assert_quiet, browser, program
+from tests.extensions.pages.browser import IN_BROWSER, tab
+from tests.extensions.pages.test_result_pages import CHANGED, small
 
-CHROMIUM = program()
-
-pytestmark = [
-    pytest.mark.browser,
-    pytest.mark.skipif(
-        CHROMIUM is None,
-        reason="no Chromium on this machine; install it, or name it in BALLPLATE_CHROMIUM",
-    ),
-]
+pytestmark = list(IN_BROWSER)
 
 # Elements that stick out of the page, other than inside parts that scroll by themselves.
 OUTSIDE = """[...document.querySelectorAll('body *')].filter(one => !one.closest('.scroll, svg, .skip') &&
@@ -36,32 +30,32 @@ CUT = """[...document.querySelectorAll('svg')].flatMap(svg => {
 })"""
 
 
-def test_page_opens_alone(plate_sizes_page: Path, tmp_path: Path) -> None:
-    assert CHROMIUM is not None
-    with browser(CHROMIUM, tmp_path) as tab:
-        for width in (360, 400, 900, 1400):
-            tab.resize(width)
-            tab.open(plate_sizes_page)
-            assert tab.value(OUTSIDE) == [] and tab.value(CUT) == []
-        assert tab.value("document.title") == wording.SIZE_OF_THE_PLATE_AND_NUMBER
-        assert tab.value("document.querySelectorAll('figure').length") == 2
-        assert (
-            tab.value("getComputedStyle(document.querySelector('svg.chart path.line')).stroke")
-            != "none"
-        )
+def test_pages_open_alone(plate_sizes_page: Path, tmp_path: Path) -> None:
+    experiment = small(**CHANGED["deficient"])
+    design, fit = tmp_path / "design.html", tmp_path / "fit.html"
+    design.write_text(page_of_design(experiment, bp.run(experiment)), encoding="utf-8")
+    bp.fit(small(), bp.simulate(small(), seed=1)).report(fit)
+    with tab() as page:
+        for file in (fit, design, plate_sizes_page):
+            page.goto(file.resolve().as_uri())
+            for width in (360, 900, 1400):
+                page.set_viewport_size({"width": width, "height": 900})
+                assert page.evaluate(OUTSIDE) == [] and page.evaluate(CUT) == [], (file, width)
+        assert page.title() == wording.SIZE_OF_THE_PLATE_AND_NUMBER
+        assert page.locator("figure").count() == 2
+        line = "getComputedStyle(document.querySelector('svg.chart path.line')).stroke"
+        assert page.evaluate(line) != "none"
         colours = []
         for scheme in ("light", "dark"):
-            tab.ask(
-                "Emulation.setEmulatedMedia",
-                features=[{"name": "prefers-color-scheme", "value": scheme}],
-            )
-            colours.append(tab.value("getComputedStyle(document.body).backgroundColor"))
+            page.emulate_media(color_scheme=scheme)
+            colours.append(page.evaluate("getComputedStyle(document.body).backgroundColor"))
         assert colours[0] == "rgb(255, 255, 255)" and colours[1] != colours[0]
         # The skip link is the first thing that the keyboard reaches, and shows itself then.
-        tab.value("document.querySelector('.skip').focus()")
-        assert tab.value("document.querySelector('.skip').getBoundingClientRect().left") >= 0
-        tab.ask("Emulation.setEmulatedMedia", media="print", features=[])
-        assert (
-            tab.value("getComputedStyle(document.querySelector('.scroll')).overflowX") == "visible"
-        )
-        assert_quiet(tab)
+        page.keyboard.press("Tab")
+        assert page.evaluate("document.activeElement.matches('.skip')")
+        assert page.locator(".skip").bounding_box()["x"] >= 0
+        page.emulate_media(media="print")
+        overflow = "getComputedStyle(document.querySelector('.scroll')).overflowX"
+        assert page.evaluate(overflow) == "visible"
+        assert page.errors == []
+        assert all(url.startswith(("file:", "data:")) for url in page.asked)

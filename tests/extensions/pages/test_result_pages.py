@@ -88,22 +88,6 @@ def test_every_figure_of_a_fits_page_is_that_of_the_json(
         assert f"/fit/estimates/{name}/value" in quoted
 
 
-def test_a_figure_that_is_not_the_jsons_is_noticed(
-    fitted: bp.Fit, page: str, reliability: dict[str, Any]
-) -> None:
-    data = {"fit": fitted.to_dict(), "reliability": reliability}
-    assert_quoted(page, data)
-    wrong = re.sub(r'(data-path="/fit/sigma"[^>]*>)[\d.]+', r"\g<1>9.87", page)
-    assert wrong != page
-    with pytest.raises(AssertionError):
-        assert_quoted(wrong, data)
-    with pytest.raises(AssertionError):
-        assert_quoted(page.replace("<tbody>", "<tbody><tr><td>1.5</td></tr>", 1), data)
-    data["fit"]["quantities"]["U6"]["maximum"] *= 1.0 + 1e-12
-    with pytest.raises(AssertionError):
-        assert_quoted(page, data)
-
-
 def test_a_page_in_two_dimensions_has_plates_and_no_curves() -> None:
     experiment = bp.load("designs/certified/two-dimensions.yaml")
     fit = bp.fit(experiment, bp.simulate(experiment, seed=1))

@@ -1,4 +1,4 @@
-"""A studio and a Chromium that Playwright drives, for the tests."""
+"""A studio in a process of its own and its page in a browser, for the tests."""
 
 from __future__ import annotations
 
@@ -6,35 +6,18 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
-from tests.extensions.pages.browser import program
-
 pytest.importorskip("starlette", reason="the studio is an extra")
-INSTALL = "python -m pip install 'ballplate[test,browser]', and a Chromium"
-pytest.importorskip("playwright", reason=f"no browser is driven without it: {INSTALL}")
-
-# A picture in three dimensions without a graphics card.
-FLAGS = (
-    "--no-sandbox",
-    "--no-first-run",
-    "--disable-quic",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--enable-unsafe-swiftshader",
-    "--use-angle=swiftshader",
-)
 
 
 class Studio:
     """A studio in a process of its own; `address` has its token."""
 
     def __init__(self, design: Path, port: int = 0) -> None:
+        self.design = design
         command = [sys.executable, "-m", "ballplate", "studio", str(design), "--no-browser"]
         self.process = subprocess.Popen(
             [*command, "--port", str(port)],
@@ -63,52 +46,25 @@ class Studio:
         self.process.stdout.close()
 
 
-def chromium() -> str | None:
-    """The Chromium of this machine, or the one that Playwright has fetched."""
-    from playwright.sync_api import sync_playwright
-
-    if found := program():
-        return found
-    with sync_playwright() as playwright:
-        fetched = playwright.chromium.executable_path
-    return fetched if Path(fetched).exists() else None
-
-
-IN_BROWSER = (
-    pytest.mark.browser,
-    pytest.mark.skipif(chromium() is None, reason=f"no Chromium on this machine: {INSTALL}"),
-)
-"""Marks of tests that need a browser."""
-
-
-@contextmanager
-def tab(width: int = 1400, height: int = 900, touches: bool = False) -> Iterator:
-    """A tab of a browser, on a touch screen or not, with `errors`, what went wrong in it, and
-    `asked`, all requests.
-    """
-    from playwright.sync_api import sync_playwright
-
-    path = chromium()
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=path, args=list(FLAGS))
-        size = {"width": width, "height": height}
-        page = browser.new_context(viewport=size, has_touch=touches).new_page()
-        page.errors, page.asked = [], []
-        page.on("pageerror", lambda error: page.errors.append(str(error)))
-        page.on(
-            "console",
-            lambda said: page.errors.append(said.text) if said.type == "error" else None,
-        )
-        page.on("request", lambda request: page.asked.append(request.url))
-        page.set_default_timeout(60_000)
-        yield page
-        browser.close()
-
-
 def opened(page, studio: Studio) -> None:
     """Open a studio's page, and wait for its design with its figures."""
     page.goto(studio.address)
     until(page, "!!window.studio?.state()?.design && !window.studio.state().pending")
+
+
+def opened_anew(page, studio: Studio) -> None:
+    """Open a studio's page with the text of its file and no computation, whatever an earlier test
+    has done; revisions that are waited for count from here.
+    """
+    home, asks = studio.address.partition("?")[0], page.request
+    asks.get(studio.address)
+    for job in asks.get(f"{home}api/jobs").json():
+        asks.post(f"{home}api/stop", data={"id": job["id"]})
+    text = studio.design.read_text("utf-8")
+    if asks.get(f"{home}api/state").json()["text"] != text:
+        asks.post(f"{home}api/do", data={"do": "text", "text": text})
+    opened(page, studio)
+    page.before = page.evaluate("window.studio.state().revision")
 
 
 def until(page, expression: str, seconds: float = 60.0) -> None:
@@ -120,7 +76,8 @@ def until(page, expression: str, seconds: float = 60.0) -> None:
 
 
 def settled(page, revision: int) -> dict:
-    """The state when the design has reached a revision, with its figures."""
+    """The state when the design has been changed so many times, with its figures."""
+    revision += getattr(page, "before", 0)
     until(page, f"window.studio?.state()?.revision >= {revision} && !window.studio.state().pending")
     return page.evaluate("window.studio.state()")
 

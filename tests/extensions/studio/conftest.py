@@ -1,4 +1,6 @@
-"""Settings of all tests of the studio."""
+"""Settings of all tests of the studio, and one browser and one studio for those of a file."""
+
+from collections.abc import Iterator
 
 import pytest
 
@@ -7,3 +9,34 @@ import pytest
 def patient(monkeypatch: pytest.MonkeyPatch) -> None:
     """Figures are waited for, however busy the machine is."""
     monkeypatch.setattr("ballplate.extensions.studio.session.PATIENCE", 120.0)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator:
+    from tests.extensions.pages.browser import chrome
+
+    with chrome() as found:
+        yield found
+
+
+@pytest.fixture(scope="module")
+def studio(tmp_path_factory: pytest.TempPathFactory) -> Iterator:
+    from tests.extensions.studio.chromium import Studio
+    from tests.extensions.studio.small import SMALL
+
+    path = tmp_path_factory.mktemp("studio") / "plate.yaml"
+    path.write_text(SMALL, encoding="utf-8")
+    with Studio(path) as found:
+        yield found
+
+
+@pytest.fixture
+def page(browser, studio) -> Iterator:
+    """A new tab with the small quickstart."""
+    from tests.extensions.pages.browser import new_tab
+    from tests.extensions.studio.chromium import opened_anew
+
+    with new_tab(browser) as found:
+        opened_anew(found, studio)
+        yield found
+        assert found.errors == []

@@ -15,7 +15,8 @@ from pathlib import Path
 from ballplate.designs import shipped
 from PIL import Image
 
-from tests.extensions.studio.chromium import Studio, settled, tab, until
+from tests.extensions.pages.browser import tab
+from tests.extensions.studio.chromium import Studio, settled, until
 
 RATE = 8  # pictures in a second
 PERIOD = 2.4  # seconds of one swing

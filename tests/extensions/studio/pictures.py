@@ -12,7 +12,8 @@ from pathlib import Path
 import ballplate as bp
 from ballplate.designs import shipped
 
-from tests.extensions.studio.chromium import Studio, settled, spot, tab, until
+from tests.extensions.pages.browser import tab
+from tests.extensions.studio.chromium import Studio, settled, spot, until
 
 # At which letters stay sharp, in a fifth of the bytes of PNG.
 QUALITY = 82

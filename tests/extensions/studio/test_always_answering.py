@@ -7,7 +7,6 @@ from pathlib import Path
 import ballplate as bp
 import numpy as np
 import pytest
-from ballplate.designs import shipped
 
 pytest.importorskip("starlette", reason="the studio is an extra")
 
@@ -17,9 +16,9 @@ from ballplate.extensions.studio.document import DesignDocument, experiment_of, 
 from ballplate.extensions.studio.judging import judgement, previewed
 from ballplate.extensions.studio.session import Session
 
+from tests.extensions.studio.small import SMALL as TEXT
 from tests.reference.small_quickstart import in_lengths
 
-TEXT = Path(shipped("quickstart.yaml")).read_text(encoding="utf-8")
 NAMES = ["z low", "z high", "x low", "x high", "y low", "y high"]
 
 
@@ -133,7 +132,7 @@ def test_a_plate_larger_than_the_volume_is_named_when_it_cannot_be_fitted(docume
 @pytest.mark.parametrize("like", ["z low", "x high"])
 def test_an_added_position_lies_within_the_volume_wherever_it_is_asked_for(document, like):
     """A plate stands on the floor that is pointed at; none is outside, and each has a new place."""
-    spots = [[x, y, 0.0] for x in (0, 0.25, 0.5, 0.75, 1) for y in (0, 0.25, 0.5, 0.75, 1)]
+    spots = [[x, y, 0.0] for x in (0, 0.5, 1) for y in (0, 0.5, 1)]
     for spot in spots:
         put = done(document, {"do": "put", "at": spot, "like": like})
         assert not any(place["problem"] for place in scene_of(put)["positions"]), spot
@@ -144,7 +143,7 @@ def test_an_added_position_lies_within_the_volume_wherever_it_is_asked_for(docum
     assert min(np.linalg.norm(middle - other) for other in taken) > 0.05
 
 
-@pytest.mark.parametrize("sides", [(1.2, 0.9, 0.7), (3.0, 2.0, 0.7), (0.62, 0.62, 0.62)])
+@pytest.mark.parametrize("sides", [(3.0, 2.0, 0.7), (0.62, 0.62, 0.62)])
 def test_positions_are_fitted_to_another_volume(document, sides):
     """All are within it, and those that were stay where they were."""
     written = ", ".join(f"{1e3 * side:g} mm" for side in sides)
@@ -182,13 +181,9 @@ def test_positions_are_fitted_to_another_volume(document, sides):
     [
         {"do": "move", "position": "z low", "by": [0.05, 0.0, 0.1]},
         {"do": "move", "position": "x low", "by": [0.9, 0.0, 0.0]},
-        {"do": "turn", "position": "y high"},
-        {"do": "stand", "position": "z low", "across": "x"},
         {"do": "put", "at": [0.5, 0.5, 0.5]},
-        {"do": "put"},
         {"do": "off", "position": "z high"},
         {"do": "set", "path": ["machine", "repeatability"], "value": "0.4 um"},
-        {"do": "text", "text": TEXT.replace("0.2 um", "0.3 um")},
     ],
     ids=str,
 )
@@ -211,27 +206,19 @@ def test_maps_and_motions_of_one_state_are_of_one_evaluation(document):
     assert judging._evaluated.cache_info().misses == 2
 
 
-def test_keys_in_a_burst_are_one_step_back(document):
+def test_keys_in_a_burst_are_one_step_back_and_messages_name_the_position(document):
     session = Session(document.path)
     try:
-        for k in range(5):
+        for k in range(3):
             action = {"do": "move", "position": "x low", "by": [0.0, 0.01, 0.0], "burst": k > 0}
-            session.act({**action, "burst": True} if k else action)
-        session.act({"do": "move", "position": "y low", "by": [0.01, 0.0, 0.0], "burst": True})
+            session.act(action)
+        session.act({"do": "move", "position": "y low", "by": [0.01, 0.0, 2.0], "burst": True})
+        (message,) = session.state()["messages"]
+        assert message["what"] == 'position "y low"'
         session.act({"do": "undo"})
         session.act({"do": "undo"})
         state = session.state()
         assert state["text"] == TEXT and not state["back"]
-    finally:
-        session.close()
-
-
-def test_messages_name_the_position(document):
-    session = Session(document.path)
-    try:
-        session.act({"do": "move", "position": "z high", "by": [0, 0, 2]})
-        (message,) = session.state()["messages"]
-        assert message["what"] == 'position "z high"'
     finally:
         session.close()
 

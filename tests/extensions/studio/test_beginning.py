@@ -145,7 +145,7 @@ def test_the_command_needs_no_file(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     opened: list[Path] = []
 
-    def serve(session: Session, port: int, tell: object) -> None:
+    def serve(session: Session, *_: object) -> None:
         opened.append(session.path)
         session.close()
 

@@ -16,8 +16,6 @@ from ballplate.extensions.studio.document import (
 )
 from ballplate.simulator.inputs.messages import ExperimentError
 
-from tests.extensions.studio import wording
-
 
 @pytest.fixture
 def design(tmp_path: Path) -> Path:
@@ -84,19 +82,6 @@ def test_reading_the_file_again_leaves_the_text_that_was_here_one_step_back(desi
     assert saved(undone(again)).is_saved
 
 
-def test_a_move_changes_the_place_alone_and_keeps_comments(design):
-    before = opened(design)
-    after = done(before, {"do": "move", "position": "z low", "by": [0.02, 0.01, 0.03]})
-    old, new = (experiment_of(one).positions[0].pose for one in (before, after))
-    assert new.origin - old.origin == pytest.approx([0.02, 0.01, 0.03], abs=1e-12)
-    lines = [
-        (a, b)
-        for a, b in zip(before.text.splitlines(), after.text.splitlines(), strict=True)
-        if a != b
-    ]
-    assert len(lines) == 1 and "name: z low" in lines[0][0]
-
-
 def test_standing_across_another_axis_keeps_the_middle(design):
     before = opened(design)
     up = done(before, {"do": "move", "position": "z low", "by": [0.1, 0.1, 0.3]})
@@ -110,15 +95,6 @@ def test_standing_across_another_axis_keeps_the_middle(design):
         middles.append(pose.rotation @ middle + pose.origin)
     assert middles[1] == pytest.approx(middles[0], abs=1e-9)
     assert abs(new.positions[0].pose.rotation[:, 2]) == pytest.approx([1.0, 0.0, 0.0])
-
-
-def test_balls_and_probes_are_chosen(design):
-    document = done(
-        opened(design), {"do": "balls", "position": "x low", "balls": ["r5c5", "r1c1", "r1c5"]}
-    )
-    document = done(document, {"do": "probes", "position": "x low", "probes": ["left"]})
-    (group,) = experiment_of(document).positions[2].readings
-    assert group.balls == ("r1c1", "r1c5", "r5c5") and group.probes == ("left",)
 
 
 @pytest.mark.parametrize(
@@ -142,12 +118,6 @@ def test_what_an_action_lacks_is_told(design, action, words):
     with pytest.raises(ActionError) as told:
         done(opened(design), action)
     assert words in str(told.value)
-
-
-def test_a_move_out_of_the_volume_is_written_and_no_experiment(design):
-    moved = done(opened(design), {"do": "move", "position": "z low", "by": [0.0, 0.0, -0.4]})
-    with pytest.raises(ExperimentError, match=wording.BELOW_THE_MEASURING_VOLUME):
-        experiment_of(moved)
 
 
 def test_a_text_that_is_wrong_is_kept_and_told_with_its_line(design):

@@ -4,13 +4,10 @@ volume's walls.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from pathlib import Path
-
 import pytest
-from ballplate.designs import shipped
 
-from tests.extensions.studio.chromium import IN_BROWSER, Studio, opened, settled, spot, tab, until
+from tests.extensions.pages.browser import IN_BROWSER
+from tests.extensions.studio.chromium import settled, spot, until
 
 pytestmark = [*IN_BROWSER, pytest.mark.slow]
 
@@ -25,17 +22,12 @@ EYE += " return [zoom, [turn, rise, ...shift]]; })()"
 
 
 @pytest.fixture
-def page(tmp_path: Path) -> Iterator:
-    """A tab with the quickstart, whose plate `z low` is chosen: 700 mm in a cube of 1000 mm."""
-    path = tmp_path / "plate.yaml"
-    path.write_bytes(Path(shipped("quickstart.yaml")).read_bytes())
-    with Studio(path) as studio, tab() as page:
-        opened(page, studio)
-        page.click("#positions button.name >> nth=0")
-        page.evaluate(CALLS)
-        page.wait_for_timeout(200)
-        yield page
-        assert page.errors == []
+def page(page):
+    """The plate `z low`, 700 mm in a cube of 1000 mm, is chosen."""
+    page.click("#positions button.name >> nth=0")
+    page.evaluate(CALLS)
+    page.wait_for_timeout(200)
+    return page
 
 
 def calls(page, name: str) -> list:

@@ -1,4 +1,4 @@
-"""Ctrl-C while an answer is under way ends the studio with its own words."""
+"""Ctrl-C while an answer is computed or sent ends the studio with its own words."""
 
 from __future__ import annotations
 
@@ -13,30 +13,35 @@ from threading import Thread
 
 import pytest
 
-SLOW = """
-import sys, time
+# A signal comes in the server's own thread while another one waits, or while it sends an answer.
+SCRIPT = """
+import os, signal, sys, time
+from ballplate.__main__ import main
+from ballplate.extensions.studio import server
 from ballplate.extensions.studio.session import Session
 
-state = Session.state
+
+def after(function):
+    def done(*given):
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(SECONDS)
+        return function(*given)
+    return done
 
 
-def slow(session, *given):
-    print("asked", file=sys.stderr, flush=True)
-    time.sleep(2)
-    return state(session, *given)
-
-
-Session.state = slow
-from ballplate.__main__ import main
-
+PLACE = after(PLACE)
 if __name__ == "__main__":
     sys.exit(main())
 """
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="sends a signal of POSIX")
-def test_no_traceback_of_an_answer_that_is_interrupted(tmp_path: Path) -> None:
-    (tmp_path / "slow.py").write_text(SLOW)
+@pytest.mark.parametrize(("place", "seconds"), [("Session.state", 2), ("server._json", 0)])
+def test_no_traceback_of_an_answer_that_is_interrupted(
+    tmp_path: Path, place: str, seconds: int
+) -> None:
+    script = SCRIPT.replace("PLACE", place).replace("SECONDS", str(seconds))
+    (tmp_path / "slow.py").write_text(script)
     words = [sys.executable, "slow.py", "studio", "new.yaml", "--no-browser"]
     with subprocess.Popen(
         words,
@@ -57,9 +62,9 @@ def test_no_traceback_of_an_answer_that_is_interrupted(tmp_path: Path) -> None:
                 opener.open(f"{address.partition('?')[0]}api/state").read()
 
         Thread(target=ask, daemon=True).start()
-        while process.stderr.readline() != "asked\n":
-            assert process.poll() is None
-        process.send_signal(signal.SIGINT)
-        told = process.communicate(timeout=60)[1]
+        try:
+            told = process.communicate(timeout=60)[1]
+        finally:
+            process.kill()
     assert process.returncode == 130
     assert "interrupted" in told and "Traceback" not in told and "Error" not in told

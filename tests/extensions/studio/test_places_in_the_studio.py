@@ -38,6 +38,8 @@ def origins(experiment: bp.Experiment) -> dict[str, list[float]]:
 def test_dragging_writes_lengths_along_the_axes_that_change(document: DesignDocument) -> None:
     moved = done(document, {"do": "move", "position": "z low", "by": [0.1, 0, 0]})
     assert "level: 30 %, corner: {x: 100 mm, y: low}" in line_of(moved, "z low")
+    lines = zip(document.text.splitlines(), moved.text.splitlines(), strict=True)
+    assert [old for old, new in lines if old != new] == [line_of(document, "z low")]
     before, after = origins(experiment_of(document)), origins(experiment_of(moved))
     assert after["z low"] == pytest.approx(np.add(before["z low"], [0.1, 0.0, 0.0]))
     del before["z low"], after["z low"]
@@ -48,7 +50,7 @@ def test_dragging_writes_lengths_along_the_axes_that_change(document: DesignDocu
     "action",
     [
         {"do": "probes", "position": "z low", "probes": ["left", "down"]},
-        {"do": "balls", "position": "z low", "balls": ["r1c1", "r2c2", "r3c1"]},
+        {"do": "balls", "position": "z low", "balls": ["r3c1", "r1c1", "r2c2"]},
     ],
 )
 def test_other_readings_leave_the_plate_where_it_is(
@@ -57,8 +59,10 @@ def test_other_readings_leave_the_plate_where_it_is(
     changed = done(document, action)
     assert "level: 250 mm, corner: {x: 0 mm, y: 0 mm}" in line_of(changed, "z low")
     assert origins(experiment_of(changed)) == origins(experiment_of(document))
-    (place, *_) = experiment_of(changed).positions
-    assert list(place.probes) == action.get("probes", ["down"])
+    (group,) = experiment_of(changed).positions[0].readings
+    assert list(group.probes) == action.get("probes", ["down"])
+    # In the order of the artefact.
+    assert "balls" not in action or group.balls == ("r1c1", "r2c2", "r3c1")
 
 
 @pytest.mark.parametrize("name", ["z low", "x high"])

@@ -10,10 +10,11 @@ from pathlib import Path
 
 import ballplate as bp
 import pytest
-from ballplate.designs import shipped
 
+from tests.extensions.pages.browser import IN_BROWSER, new_tab
 from tests.extensions.studio import wording
-from tests.extensions.studio.chromium import IN_BROWSER, Studio, settled, spot, tab, until
+from tests.extensions.studio.chromium import Studio, settled, spot, until
+from tests.extensions.studio.small import SMALL
 
 pytestmark = [*IN_BROWSER, pytest.mark.slow]
 
@@ -24,14 +25,18 @@ one.getBoundingClientRect().right > document.documentElement.clientWidth + 1)
 .map(one => one.outerHTML.slice(0, 90))"""
 
 
+FEW = "".join(
+    line
+    for line in SMALL.splitlines(keepends=True)
+    if not any(f"name: {name}," in line for name in ("z high", "x low", "x high", "y high"))
+)
+"""The quickstart's plate in too few positions."""
+
+
 @pytest.fixture
-def design(tmp_path: Path) -> Path:
-    """The quickstart's plate in too few positions."""
+def few(tmp_path: Path) -> Path:
     path = tmp_path / "plate.yaml"
-    lines = Path(shipped("quickstart.yaml")).read_text().splitlines(keepends=True)
-    left_out = ("z high", "x low", "x high", "y high")
-    kept = [line for line in lines if not any(f"name: {name}," in line for name in left_out)]
-    path.write_text("".join(kept))
+    path.write_text(FEW)
     return path
 
 
@@ -46,8 +51,8 @@ def drag(page, name: str, by: tuple[int, int], steps: int = 5) -> None:
 
 
 # In one piece: an hour in its order.
-def test_an_hour(design: Path) -> None:
-    with Studio(design) as studio, tab() as page:
+def test_an_hour(browser, few: Path) -> None:
+    with Studio(few) as studio, new_tab(browser) as page:
         page.goto(studio.address)
         until(page, "!!window.studio?.state()?.design")
         assert "Rank deficiency" in page.inner_text("#verdict")
@@ -56,11 +61,8 @@ def test_an_hour(design: Path) -> None:
         page.wait_for_selector("[data-motion='0'][aria-pressed='true']")
         until(page, "!!window.studio.view.motions")
         drawn = "document.querySelector('#view').innerHTML"
-        pictures = set()
-        for _ in range(3):
-            pictures.add(page.evaluate(drawn))
-            page.wait_for_timeout(400)
-        assert len(pictures) == 3
+        page.evaluate("window.drawn = " + drawn)
+        until(page, f"window.drawn !== {drawn}")
         # And rests when it is stopped.
         page.click("[data-motion='0']")
         until(page, "!window.studio.view.motions && !window.studio.view.next")
@@ -123,21 +125,21 @@ def test_an_hour(design: Path) -> None:
             for one in page.evaluate("window.studio.state().design.quantities")
             if one["symbol"] == "U6"
         )
-        predicted = bp.run(design).quantities["U6"]
+        predicted = bp.run(few).quantities["U6"]
         assert lengths["average"] == predicted.average
-        command = [sys.executable, "-m", "ballplate", "check", str(design)]
+        command = [sys.executable, "-m", "ballplate", "check", str(few)]
         checked = subprocess.run(command, capture_output=True, text=True)
         assert checked.returncode == 0 and "full rank" in checked.stdout, checked
         # What another program writes meanwhile is not overwritten.
         page.click("#positions button.name >> nth=0")
         page.click("#turn")
         until(page, "!window.studio.state().saved")
-        written = design.read_bytes() + b"# another hand\n"
-        design.write_bytes(written)
+        written = few.read_bytes() + b"# another hand\n"
+        few.write_bytes(written)
         page.click("#save")
         page.wait_for_selector("#notice.bad")
         assert wording.HAS_CHANGED_ON_DISK in page.inner_text("#notice")
-        assert design.read_bytes() == written
+        assert few.read_bytes() == written
         # Nor is the other window's design: this one shows it, and asks again.
         with page.context.new_page() as other:
             other.goto(f"http://127.0.0.1:{studio.port}/")
@@ -160,7 +162,7 @@ def test_an_hour(design: Path) -> None:
         page.click("#turn")
         until(page, "document.querySelector('#notice').textContent.includes('Start it again')")
         assert all("ERR_CONNECTION" in one for one in page.errors)
-        with Studio(design, studio.port) as again:
+        with Studio(few, studio.port) as again:
             page.wait_for_timeout(2500)
             # It is another studio, which knows this page no more until its address is opened.
             assert "with its token" in page.inner_text("#notice")
@@ -183,94 +185,131 @@ def test_an_hour(design: Path) -> None:
 
 
 @pytest.mark.long
-def test_the_keyboard_is_enough(design: Path) -> None:
+def test_the_keyboard_is_enough(page) -> None:
     """Who works without a mouse stays where he was, though parts of the page are made anew."""
-    with Studio(design) as studio, tab() as page:
-        page.goto(studio.address)
-        until(page, "!!window.studio?.state()?.design")
 
-        def reach(selector: str) -> None:
-            for _ in range(150):
-                page.keyboard.press("Tab")
-                if page.evaluate("([s]) => document.activeElement.matches(s)", [selector]):
-                    return
-            raise AssertionError(f"no {selector} by the Tab key")
+    def reach(selector: str) -> None:
+        for _ in range(150):
+            page.keyboard.press("Tab")
+            if page.evaluate("([s]) => document.activeElement.matches(s)", [selector]):
+                return
+        raise AssertionError(f"no {selector} by the Tab key")
 
-        def press(key: str) -> dict:
-            revision = page.evaluate("window.studio.state().revision")
-            page.keyboard.press(key)
-            return settled(page, revision + 1)
+    def press(key: str) -> dict:
+        revision = page.evaluate("window.studio.state().revision") - page.before
+        page.keyboard.press(key)
+        return settled(page, revision + 1)
 
-        at = "document.activeElement.getAttribute('aria-label') || document.activeElement.id"
-        reach("#positions button.name")
-        page.keyboard.press("Enter")
-        assert page.evaluate(at) == "choose z low"
-        reach("#turn")
-        turned = press("Enter")["text"]
-        assert page.evaluate(at) == "turn"
-        assert press("Enter")["text"] != turned and page.evaluate(at) == "turn"
-        reach("#position .balls button")
-        press("Space")
-        assert page.evaluate(at) == "r1c1"
-        reach("[data-section=machine] > summary")
-        page.keyboard.press("Enter")
-        path = '["machine","repeatability"]'
-        reach(f"#forms [data-path='{path}']")
-        page.keyboard.press("Control+a")
-        page.keyboard.type("0.3 um")
-        assert press("Enter")["data"]["machine"]["repeatability"] == "0.3 um"
-        assert page.evaluate("document.activeElement.dataset.path") == path
-        reach("#view")
-        before = page.evaluate("window.studio.state().design.scene.positions[0].origin")
-        after = press("PageUp")["design"]["scene"]["positions"][0]["origin"]
-        assert sum(a != b for a, b in zip(before, after, strict=True)) == 1
-        assert page.evaluate(at).startswith("The volume")
-        state = press("Control+s")
-        assert state["saved"] and page.errors == []
+    at = "document.activeElement.getAttribute('aria-label') || document.activeElement.id"
+    reach("#positions button.name")
+    page.keyboard.press("Enter")
+    assert page.evaluate(at) == "choose z low"
+    reach("#turn")
+    turned = press("Enter")["text"]
+    assert page.evaluate(at) == "turn"
+    assert press("Enter")["text"] != turned and page.evaluate(at) == "turn"
+    reach("#position .balls button")
+    press("Space")
+    assert page.evaluate(at) == "r1c1"
+    reach("[data-section=machine] > summary")
+    page.keyboard.press("Enter")
+    path = '["machine","repeatability"]'
+    reach(f"#forms [data-path='{path}']")
+    page.keyboard.press("Control+a")
+    page.keyboard.type("0.3 um")
+    assert press("Enter")["data"]["machine"]["repeatability"] == "0.3 um"
+    assert page.evaluate("document.activeElement.dataset.path") == path
+    reach("#view")
+    before = page.evaluate("window.studio.state().design.scene.positions[0].origin")
+    after = press("PageUp")["design"]["scene"]["positions"][0]["origin"]
+    assert sum(a != b for a, b in zip(before, after, strict=True)) == 1
+    assert page.evaluate(at).startswith("The volume")
+    state = press("Control+s")
+    assert state["saved"]
 
 
-@pytest.mark.parametrize("width", [390, 1024, 1440])
-def test_the_first_page_fits_small_screens(tmp_path: Path, width: int) -> None:
+def test_pages_fit_small_screens(browser, page, tmp_path: Path) -> None:
+    """That of a design, and the one on which designs begin."""
+    page.click("#positions button.name >> nth=0")
+    for summary in page.locator("#forms > details > summary").all():
+        summary.click()
+    for width in (400, 900):
+        page.set_viewport_size({"width": width, "height": 900})
+        until(page, f"({OUTSIDE}).length === 0")
     (tmp_path / "a file of a rather long name for a button of the first page.yaml").touch()
-    with Studio(tmp_path / "new.yaml") as studio, tab(width) as page:
-        page.goto(studio.address)
-        page.wait_for_selector("#draft dl")
-        assert page.evaluate(OUTSIDE) == [] and page.errors == []
+    with Studio(tmp_path / "new.yaml") as studio, new_tab(browser) as first:
+        first.goto(studio.address)
+        first.wait_for_selector("#draft dl")
+        for width in (390, 1024):
+            first.set_viewport_size({"width": width, "height": 900})
+            until(first, f"({OUTSIDE}).length === 0")
+        assert first.errors == []
 
 
-@pytest.mark.parametrize("width", [400, 900, 1400])
-def test_the_page_fits_small_screens(design: Path, width: int) -> None:
-    with Studio(design) as studio, tab(width) as page:
-        page.goto(studio.address)
-        until(page, "!!window.studio?.state()?.design")
-        page.click("#positions button.name >> nth=0")
-        for summary in page.locator("#forms > details > summary").all():
-            summary.click()
-        assert page.evaluate(OUTSIDE) == []
-        assert page.errors == []
+def test_results_of_an_earlier_design_are_marked_and_a_refused_sweep_says_where(page) -> None:
+    page.click("#sweep")
+    page.fill("[data-axis=paths] >> nth=1", "artefacts.plate.size[0]")
+    page.fill("[data-axis=values] >> nth=1", "750 mm; 400")
+    page.click("#compute")
+    page.wait_for_selector("#sweep-error >> text=/^artefacts.plate.size.* has no unit/")
+    # What was typed is there still.
+    page.fill("[data-axis=values] >> nth=1", "750 mm; 400 mm")
+    page.click("#compute")
+    page.wait_for_selector("#jobs li[data-state=done]", timeout=200_000)
+    heads = page.locator("#jobs th").all_inner_texts()
+    assert heads[:2] == ["repeatability", "size[0]"] and "U6 max. µm" in heads
+    assert page.locator("#jobs li >> text=of an earlier design").count() == 0
+    page.click("#positions button.name >> nth=0")
+    page.click("#turn")
+    page.wait_for_selector("#jobs li >> text=of an earlier design")
+    page.click("#undo")
+    until(page, "!document.querySelector('#jobs').innerText.includes('of an earlier')")
 
 
-def test_results_of_an_earlier_design_are_marked_and_a_refused_sweep_says_where(
-    design: Path,
-) -> None:
-    with Studio(design) as studio, tab() as page:
-        page.goto(studio.address)
-        until(page, "!!window.studio?.state()?.design")
-        page.click("#sweep")
-        page.fill("[data-axis=paths] >> nth=1", "artefacts.plate.size[0]")
-        page.fill("[data-axis=values] >> nth=1", "750 mm; 400")
-        page.click("#compute")
-        page.wait_for_selector("#sweep-error >> text=/^artefacts.plate.size.* has no unit/")
-        # What was typed is there still.
-        page.fill("[data-axis=values] >> nth=1", "750 mm; 400 mm")
-        page.click("#compute")
-        page.wait_for_selector("#jobs li[data-state=done]", timeout=200_000)
-        heads = page.locator("#jobs th").all_inner_texts()
-        assert heads[:2] == ["repeatability", "size[0]"] and "U6 max. µm" in heads
-        assert page.locator("#jobs li >> text=of an earlier design").count() == 0
-        page.click("#positions button.name >> nth=0")
-        page.click("#turn")
-        page.wait_for_selector("#jobs li >> text=of an earlier design")
+DRAWN = "['outlines', 'boxes'].map((name) => window.studio.view[name].length)"
+
+
+def fields(page, field: str, text: str) -> None:
+    page.fill(field, text)
+    page.press(field, "Tab")
+
+
+def test_a_pool_is_filled_limited_and_planned_from(page) -> None:
+    before = page.evaluate("window.studio.state().text")
+    page.click("#pool summary")
+    page.wait_for_selector("#pool-said >> text=No candidates yet")
+    for plane in ("x", "y"):
+        page.uncheck(f"[aria-label='fill planes across {plane}']")
+    fields(page, "#turns", "0")
+    fields(page, "#count", "4")
+    page.click("#fill")
+    page.wait_for_selector("#pool-said >> text=64 candidates")
+    until(page, f"{DRAWN}.join() === '64,0'")
+    for axis in "xyz":
+        page.select_option(f"#forbidding [name={axis}]", "high")
+    page.click("#forbid")
+    page.wait_for_selector("#pool-said >> text=in a forbidden box")
+    until(page, f"{DRAWN}[1] === 1")
+    # All of it is in a form, where the box is changed and removed.
+    page.click("#forms [data-section=pool] > summary")
+    fields(page, """[data-path='["pool","limits","forbidden",0,"z"]']""", "[0 mm, 400 mm]")
+    text = settled(page, 3)["text"]
+    assert text.count("z: [0 mm, 400 mm]") == 1, text
+    page.wait_for_selector("#pool-said >> text=9 in a forbidden box")
+    page.click("#forms [data-section=pool] [aria-label^='remove forbidden 1']")
+    page.wait_for_selector("#pool-said >> text=64 candidates")
+    # Stopped, the plan is the best so far; applied, it is one step.
+    fields(page, "#hours", "8")
+    page.click("#plan")
+    page.wait_for_selector("#jobs .step >> text=best U6", timeout=200_000)
+    page.click("#jobs button >> text=stop")
+    page.wait_for_selector("#suggestions li >> text=the plan", timeout=200_000)
+    filled = page.evaluate("window.studio.state().text")
+    page.click("#suggestions [data-apply]")
+    assert "enabled: false" in settled(page, 5)["text"]
+    page.click("#undo")
+    assert settled(page, 6)["text"] == filled
+    for revision in range(7, 11):
         page.click("#undo")
-        until(page, "!document.querySelector('#jobs').innerText.includes('of an earlier')")
-        assert page.errors == []
+        last = settled(page, revision)["text"]
+    assert last == before

@@ -87,7 +87,6 @@ def test_without_the_token_nothing_is_answered(stranger, session):
         {"Sec-Fetch-Site": "cross-site"},
         {"Sec-Fetch-Site": "same-site"},
         {"Host": "example.org"},
-        {"Host": f"example.org:{PORT}"},
         {"Host": "127.0.0.1:9999"},
         {"Host": ""},
     ],
@@ -116,7 +115,7 @@ def test_a_form_of_another_page_cannot_act(client, session):
 
 @pytest.mark.parametrize(
     "name",
-    ["../other.yaml", "/etc/passwd", "sub/other.yaml", "other.txt", "", "..", "link.yaml", ".."],
+    ["../other.yaml", "/etc/passwd", "sub/other.yaml", "other.txt", "", "..", "link.yaml"],
 )
 def test_files_outside_the_folder_are_refused(client, design, tmp_path_factory, name):
     elsewhere = tmp_path_factory.mktemp("elsewhere") / "other.yaml"

@@ -109,9 +109,6 @@ def test_some_places_in_lengths_are_noted(tmp_path: Path) -> None:
     # Nothing is lost along axes where plates that follow reach both ends still.
     ends = TEXT.replace("{x: high, y: high}", "{x: 250 mm, y: 250 mm}")
     assert notes(tmp_path, ends, variants) == [(), ()]
-    # `reach` searches sizes with the same places.
-    (stays,) = bp.reach(written(tmp_path, mixed), "U6 average 0.13 um", "size").answers
-    assert any("plates span x 0 to " in remark for remark in stays.remarks)
 
 
 def test_sweeps_note_it_in_text_table_json_and_page(

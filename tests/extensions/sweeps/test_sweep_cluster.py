@@ -58,12 +58,12 @@ asyncio.run(serve())
 """
 
 
-@pytest.fixture
-def start(tmp_path: Path) -> Iterator[Start]:
-    processes = []
+@pytest.fixture(scope="module")
+def start(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Start]:
+    processes, folder = [], tmp_path_factory.mktemp("started")
 
     def begin(*arguments: str) -> subprocess.Popen[bytes]:
-        with (tmp_path / "log").open("ab") as log:
+        with (folder / "log").open("ab") as log:
             process = subprocess.Popen(
                 [sys.executable, *arguments],
                 stdout=log,
@@ -76,24 +76,23 @@ def start(tmp_path: Path) -> Iterator[Start]:
 
     yield begin
     for process in reversed(processes):
-        with suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
+        ended_at_once(process)
 
 
-@pytest.fixture
-def scheduler(tmp_path: Path, start: Start) -> tuple[str, subprocess.Popen[bytes]]:
+def ended_at_once(process: subprocess.Popen[bytes]) -> None:
+    with suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+
+
+@pytest.fixture(scope="module")
+def scheduler(
+    tmp_path_factory: pytest.TempPathFactory, start: Start
+) -> tuple[str, subprocess.Popen[bytes]]:
     """Address and process of a scheduler without workers."""
-    file = tmp_path / "scheduler.json"
-    options = [
-        "--host",
-        "127.0.0.1",
-        "--port",
-        "0",
-        "--no-dashboard",
-        "--scheduler-file",
-        str(file),
-    ]
+    file = tmp_path_factory.mktemp("scheduler") / "scheduler.json"
+    options = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
+    options += ["--scheduler-file", str(file)]
     process = start("-m", "distributed.cli.dask_scheduler", *options)
     end = time.monotonic() + 60
     # The file may be there before its content.
@@ -111,54 +110,6 @@ def ended(path: Path, address: str) -> str:
     return done.stderr
 
 
-@pytest.mark.parametrize(
-    ("worker", "words"),
-    [
-        (OTHER, "ballplate 0.0.7"),
-        (OTHER_CODE, "other code of ballplate 0.1.0"),
-    ],
-    ids=["another version", "other code"],
-)
-def test_workers_with_other_code_are_refused(
-    worker: str,
-    words: str,
-    tmp_path: Path,
-    scheduler: tuple[str, subprocess.Popen[bytes]],
-    start: Start,
-) -> None:
-    address, _ = scheduler
-    start("-c", worker + SERVE, address)
-    err = ended(small_sweep(tmp_path, 2), address)
-    assert (
-        f" has {words}, and this is ballplate 0.1.0; install the same ballplate on every worker"
-        in err
-    )
-    assert err.startswith("the worker tcp://127.0.0.1:")
-    assert stored(tmp_path / "small.sqlite") == 0
-
-
-@pytest.mark.slow
-def test_a_scheduler_that_ends(
-    tmp_path: Path, scheduler: tuple[str, subprocess.Popen[bytes]], start: Start
-) -> None:
-    address, process = scheduler
-    start("-c", SERVE, address)
-    path, store = small_sweep(tmp_path, 100, "trials: 50\n"), tmp_path / "small.sqlite"
-    arguments = command("sweep", path, "--scheduler", address)
-    with subprocess.Popen(
-        arguments, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as sweep:
-        end = time.monotonic() + 100
-        while sweep.poll() is None and stored(store) < 2 and time.monotonic() < end:
-            time.sleep(0.02)
-        process.kill()
-        out, err = sweep.communicate(timeout=100)
-    last = err.splitlines()[-1]
-    assert sweep.returncode == 3 and "Traceback" not in err and out == "", err
-    assert last.startswith(f"the scheduler at {address} has ended; finished cases are stored"), err
-    assert 2 <= stored(store) < 200
-
-
 def test_no_worker(
     tmp_path: Path, scheduler: tuple[str, subprocess.Popen[bytes]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -171,6 +122,23 @@ def test_no_worker(
         pytest.raises(ClusterError, match=wording.THE_CLUSTER_HAS_NO_WORKERS),
     ):
         cluster._check_versions(client)
+
+
+def test_workers_with_other_code_are_refused(
+    tmp_path: Path, scheduler: tuple[str, subprocess.Popen[bytes]], start: Start
+) -> None:
+    address, _ = scheduler
+    path = small_sweep(tmp_path, 2)
+    for other, words in (
+        (OTHER, "ballplate 0.0.7"),
+        (OTHER_CODE, "other code of ballplate 0.1.0"),
+    ):
+        worker = start("-c", other + SERVE, address)
+        err = ended(path, address)
+        assert f" has {words}, and this is ballplate 0.1.0; install the same ballplate on" in err
+        assert err.startswith("the worker tcp://127.0.0.1:")
+        ended_at_once(worker)
+    assert stored(tmp_path / "small.sqlite") == 0
 
 
 def test_a_worker_that_comes_later_computes_nothing_with_other_code() -> None:
@@ -198,7 +166,7 @@ def test_a_cluster_gives_the_same_rows_even_if_a_worker_dies(
     options = ["--nworkers", "2", "--nthreads", "1", "--no-dashboard"]
     options += ["--local-directory", str(tmp_path)]
     workers = start("-m", "distributed.cli.dask_worker", address, *options)
-    path = small_sweep(tmp_path, 8, "trials: 16\n")
+    path = small_sweep(tmp_path, 8, "trials: 4\n")
     assert run("sweep", path, "--workers", 1, "--store", tmp_path / "alone.sqlite").returncode == 1
     arguments = command("sweep", path, "--scheduler", address)
     with subprocess.Popen(
@@ -219,6 +187,7 @@ def test_a_cluster_gives_the_same_rows_even_if_a_worker_dies(
     assert_same(rows(tmp_path / "small.sqlite"), rows(tmp_path / "alone.sqlite"))
     # What is unpacked is in the folders of the workers, which dask deletes whatever ends them.
     assert not list(temporary.glob("ballplate-*"))
+    ended_at_once(workers)
 
 
 def test_no_scheduler(
@@ -238,3 +207,26 @@ def test_an_address_that_is_none(
     assert main(["sweep", str(small_sweep(tmp_path, 2)), "--scheduler", address]) == 3
     err = capsys.readouterr().err
     assert err.splitlines()[-1].startswith(f"{address}: is not the address of a scheduler; ")
+
+
+@pytest.mark.slow
+def test_a_scheduler_that_ends(
+    tmp_path: Path, scheduler: tuple[str, subprocess.Popen[bytes]], start: Start
+) -> None:
+    """The last test, since it ends the one that all use."""
+    address, process = scheduler
+    start("-c", SERVE, address)
+    path, store = small_sweep(tmp_path, 100, "trials: 50\n"), tmp_path / "small.sqlite"
+    arguments = command("sweep", path, "--scheduler", address)
+    with subprocess.Popen(
+        arguments, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as sweep:
+        end = time.monotonic() + 100
+        while sweep.poll() is None and stored(store) < 2 and time.monotonic() < end:
+            time.sleep(0.02)
+        process.kill()
+        out, err = sweep.communicate(timeout=100)
+    last = err.splitlines()[-1]
+    assert sweep.returncode == 3 and "Traceback" not in err and out == "", err
+    assert last.startswith(f"the scheduler at {address} has ended; finished cases are stored"), err
+    assert 2 <= stored(store) < 200

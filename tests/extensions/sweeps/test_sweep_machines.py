@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from ballplate.cli import main
 from ballplate.extensions.sweeps.bundle import bundle_of, unpack
 from ballplate.extensions.sweeps.fingerprint import fingerprint
 from ballplate.extensions.sweeps.load import experiment_of, load_sweep
@@ -96,17 +95,3 @@ def test_they_count(sweep: Path) -> None:
         encoding="utf-8",
     )
     assert now() == found[-1]
-
-
-def test_a_sweep_runs_and_notices_a_changed_table(
-    sweep: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    options = ("--workers", "1")
-    assert main(["sweep", str(sweep), *options]) == 0
-    assert "2 cases, 2 done" in capsys.readouterr().out
-    assert main(["sweep", str(sweep), *options]) == 0
-    table = sweep.parent / "park/machines/measured/exx.csv"
-    table.write_text(table.read_text(encoding="utf-8").replace("800,", "800,9"), encoding="utf-8")
-    capsys.readouterr()
-    assert main(["sweep", str(sweep), *options]) != 0
-    assert "park/machines/measured/exx.csv: another content" in capsys.readouterr().err

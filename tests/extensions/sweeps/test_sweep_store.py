@@ -40,6 +40,18 @@ def sweep(path: Path, *options: str) -> int:
     return main(["sweep", str(path), "--workers", "1", *options])
 
 
+def count_cells(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """The numbers of the cells that are computed from now on."""
+    done = []
+
+    def counted(loaded: Sweep, task: CellTask) -> CellResult:
+        done.append(task.number)
+        return compute(loaded, task)
+
+    monkeypatch.setattr("ballplate.extensions.sweeps.local.compute", counted)
+    return done
+
+
 def test_figures_are_those_of_the_experiments(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -70,20 +82,6 @@ def test_figures_are_those_of_the_experiments(
     assert not [name for name in table if name.startswith(("U1", "U6"))]
     assert table["data_set_seed"][:6].nunique() == 6
     assert (table["ballplate_version"] == "0.1.0").all() and (table["blas_version"] != "").all()
-
-
-def test_a_second_run_computes_nothing(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    path = small_sweep(tmp_path, 2)
-    assert sweep(path) == 1
-    monkeypatch.setattr("ballplate.extensions.sweeps.local.compute", None)
-    capsys.readouterr()
-    assert sweep(path) == 1
-    assert (
-        capsys.readouterr().out
-        == f"{tmp_path}/small.sqlite: 4 cases, 2 done, 2 failed (4 of them before)\n"
-    )
 
 
 def test_a_store_of_an_earlier_format_is_read_but_not_continued(
@@ -126,20 +124,20 @@ def test_assumptions_are_assessed_for_the_best_case(tmp_path: Path) -> None:
     assert [expected.get(cell, "") for cell in table["cell"]] == table["given"].tolist()
 
 
-def test_failed_cells_are_tried_again_when_asked(tmp_path: Path) -> None:
-    path = small_sweep(tmp_path, 2)
-    assert sweep(path) == 1
-    before = rows(tmp_path / "small.sqlite")
-    assert sweep(path, "--retry-failed") == 1
-    assert_same(rows(tmp_path / "small.sqlite"), before)
-
-
-def test_the_first_failure_ends_a_run_when_asked(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+def test_the_first_failure_ends_a_run_and_is_tried_again_when_asked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = small_sweep(tmp_path, 2)
     assert sweep(path, "--fail-fast") == 1
     assert "2 done, 1 failed, 1 left" in capsys.readouterr().out
+    counted = count_cells(monkeypatch)
+    assert sweep(path, "--retry-failed") == 1
+    assert "2 done, 2 failed" in capsys.readouterr().out
+    assert sorted(counted) == [2, 3]
+    # A further run computes nothing.
+    assert sweep(path) == 1
+    told = f"{tmp_path}/small.sqlite: 4 cases, 2 done, 2 failed (4 of them before)\n"
+    assert capsys.readouterr().out == told and len(counted) == 2
 
 
 def test_a_changed_base_is_refused_with_what_changed(
@@ -202,16 +200,10 @@ def test_what_two_sweeps_share_is_computed_once(
     path.write_text(
         path.read_text(encoding="utf-8").replace("[4, 5]", "[4, 5, 6]"), encoding="utf-8"
     )
-    done = []
-
-    def counted(loaded: Sweep, task: CellTask) -> CellResult:
-        done.append(task)
-        return compute(loaded, task)
-
-    monkeypatch.setattr("ballplate.extensions.sweeps.local.compute", counted)
+    counted = count_cells(monkeypatch)
     sweep(path, "--beside")
     # What is no valid experiment is judged anew.
-    assert sorted(task.number for task in done if task.block == 0) == [2, 3, 4, 5]
+    assert sorted(counted) == [2, 3, 4, 5]
 
 
 def test_replicates_in_blocks_are_the_same_replicates(
@@ -235,26 +227,37 @@ def test_replicates_in_blocks_are_the_same_replicates(
     store.close()
 
 
+QUICKSTART = "designs/quickstart.yaml"
+
+
 @pytest.mark.parametrize(
-    ("old", "new", "differs"),
+    ("file", "old", "new", "differs"),
     [
-        ("title: ", "title: another ", False),
-        ("750 mm", "0.75 m", False),
-        ("probes: [down]", "probes: [down], repeats: 1", False),
-        ("seed: 7", "seed: 8", True),
-        ("0.2 um ", "0.21 um ", True),
-        ("z low", "z lower", True),
-        ("random: 200", "random: 201", True),
+        (QUICKSTART, "title: ", "title: another ", False),
+        (QUICKSTART, "750 mm", "0.75 m", False),
+        (QUICKSTART, "probes: [down]", "probes: [down], repeats: 1", False),
+        # Defaults of the metric depend on the number of dimensions.
+        ("designs/hurt_foss/bar-bell.yaml", "kind: metric}", "kind: metric, scale: each}", False),
+        (
+            "designs/hocken_borchardt/real.yaml",
+            "    error_model.scale: none\n",
+            "    error_model: {kind: metric}\n",
+            False,
+        ),
+        (QUICKSTART, "seed: 7", "seed: 8", True),
+        (QUICKSTART, "0.2 um ", "0.21 um ", True),
+        (QUICKSTART, "z low", "z lower", True),
+        (QUICKSTART, "random: 200", "random: 201", True),
     ],
 )
 def test_a_fingerprint_tells_what_matters(
-    tmp_path: Path, old: str, new: str, differs: bool
+    tmp_path: Path, file: str, old: str, new: str, differs: bool
 ) -> None:
-    text = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
+    text = Path(file).read_text(encoding="utf-8")
     assert old in text
     (tmp_path / "a.yaml").write_text(text, encoding="utf-8")
     (tmp_path / "b.yaml").write_text(text.replace(old, new), encoding="utf-8")
-    one, other = (fingerprint(load(tmp_path / name)[0]) for name in ("a.yaml", "b.yaml"))
+    one, other = ([*map(fingerprint, load(tmp_path / name))] for name in ("a.yaml", "b.yaml"))
     assert (one != other) == differs
 
 
@@ -347,13 +350,10 @@ def test_what_a_users_model_imports_counts(tmp_path: Path) -> None:
 
 
 def test_what_a_users_model_raises_is_the_rows_reason(tmp_path: Path) -> None:
-    path = with_own_model(tmp_path, "raises_late", "[true, false]")
-    for workers in (1, 2):
-        done = run("sweep", path, "--workers", workers, "--store", tmp_path / f"{workers}.sqlite")
-        assert done.returncode == 1 and "2 cases, 1 done, 1 failed" in done.stdout, done.stderr
-        place = re.search(r"raises_late\.py:[0-9]+: in error, code of your own: (.*)", done.stderr)
-        assert place and place[1] == wording.NO_MORE_THAN_THIRTY
-    assert_same(rows(tmp_path / "1.sqlite"), rows(tmp_path / "2.sqlite"))
+    done = run("sweep", with_own_model(tmp_path, "raises_late", "[true, false]"), "--workers", 2)
+    assert done.returncode == 1 and "2 cases, 1 done, 1 failed" in done.stdout, done.stderr
+    place = re.search(r"raises_late\.py:[0-9]+: in error, code of your own: (.*)", done.stderr)
+    assert place and place[1] == wording.NO_MORE_THAN_THIRTY
 
 
 def test_rows_do_not_depend_on_where_the_command_is_started(tmp_path: Path) -> None:
@@ -363,11 +363,11 @@ def test_rows_do_not_depend_on_where_the_command_is_started(tmp_path: Path) -> N
         "base: quickstart.yaml", "base: ../quickstart.yaml"
     )
     (tmp_path / "sweeps" / "s.yaml").write_text(text, encoding="utf-8")
-    here = command("sweep", "s.yaml", "--workers", 2, "--store", tmp_path / "1.sqlite")
+    here = command("sweep", "s.yaml", "--workers", 1, "--store", tmp_path / "1.sqlite")
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     subprocess.run(here, cwd=tmp_path / "sweeps", env=environment, capture_output=True, check=False)
-    elsewhere = ("--store", tmp_path / "2.sqlite", "--workers", 1)
-    assert run("sweep", tmp_path / "sweeps" / "s.yaml", *elsewhere).returncode == 1
+    elsewhere = ("--store", str(tmp_path / "2.sqlite"))
+    assert sweep(tmp_path / "sweeps" / "s.yaml", *elsewhere) == 1
     first = rows(tmp_path / "1.sqlite")
     assert first["reason"][2].startswith("../quickstart.yaml:40:5: positions[0]: ")
     assert_same(first, rows(tmp_path / "2.sqlite"))
