@@ -195,8 +195,6 @@ def test_too_little_is_told_with_what_stays_open(
     [
         (["--criterion", "U7"], "choose from U6"),
         (["--hours", "0"], "hours above zero"),
-        (["--hours", "soon"], "hours above zero"),
-        (["--positions", "-1"], "whole number"),
         (["--sheet", "sheet.pdf"], "ends in .html"),
     ],
 )
@@ -207,11 +205,6 @@ def test_wrong_usage(
         main(["plan", str(drawn), *options])
     assert left.value.code == 2
     assert text in capsys.readouterr().err
-
-
-def test_a_file_without_a_pool_says_so(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["plan", "designs/quickstart.yaml", "--positions", "3"]) == 3
-    assert "pool: missing; add candidates" in capsys.readouterr().err
 
 
 def test_the_pool_is_not_overwritten_by_the_choice(

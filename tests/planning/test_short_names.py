@@ -13,8 +13,6 @@ import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.planning.set_ups import renamed
-from ballplate.planning.short_names import short_names
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Position
 
@@ -159,29 +157,6 @@ def test_readings_under_short_names_need_the_plan_that_gave_them(
     readings.write_text("position,ball,probe,x_mm,y_mm,z_mm\nP1,r1c1,down,1,2,3\n")
     assert main(["plan", str(pool), "--done", str(readings), "--positions", "3"]) == 3
     assert "--from" in capsys.readouterr().err
-
-
-def test_numbers_in_use_are_passed_over(pool: Path) -> None:
-    (experiment,) = load(pool, planning=True)
-    assert experiment.pool is not None
-    own, given, *composed = experiment.pool.candidates
-    order = [composed[0], own, composed[1], given, renamed(composed[2], composed[2].name)]
-    taken = [one.name for one in experiment.pool.candidates]
-    assert list(short_names(order, {}, taken).values()) == ["P1", "P3", "P5"]
-    known = {composed[1].name: "P7", composed[3].name: "P1"}
-    assert short_names(order, known, taken) == {
-        composed[0].name: "P3",
-        composed[1].name: "P7",
-        composed[2].name: "P5",
-    }
-
-
-def test_a_position_that_is_set_up_again_after_its_own_name_keeps_it(pool: Path) -> None:
-    (experiment,) = load(pool, planning=True)
-    assert experiment.pool is not None
-    _, given, composed, *_ = experiment.pool.candidates
-    order = [renamed(given, "my own again 2"), renamed(composed, f"{composed.name} again")]
-    assert short_names(order, {}, []) == {f"{composed.name} again": "P2"}
 
 
 def test_a_composed_position_that_an_influence_names_keeps_its_name(pool: Path) -> None:
