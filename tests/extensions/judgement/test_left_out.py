@@ -54,16 +54,6 @@ def fitted_without(design: Design, x: Real, position: int) -> tuple[float, int]:
     return solution.factor.sum_of_squares, freedom
 
 
-def test_the_rest_is_fitted_as_if_the_others_had_not_been_read() -> None:
-    design = lay_out(small())
-    observed = campaign(design, 1)
-    for position in (0, 2, 5):
-        found = rest_of(observed.design, observed.x, position)
-        square, freedom = fitted_without(observed.design, observed.x, position)
-        assert found is not None and found.degrees_of_freedom == freedom
-        np.testing.assert_allclose(found.sum_of_squares, square, rtol=1e-5)
-
-
 @pytest.mark.parametrize("position", [0, 3])
 def test_prediction_errors_and_their_variances_are_those_of_dense_algebra(position: int) -> None:
     design = lay_out(small())
@@ -131,7 +121,7 @@ def test_the_change_of_a_length_scatters_as_it_says() -> None:
     """
     design = lay_out(small())
     standardised = []
-    for seed in range(10):
+    for seed in range(6):
         observed = campaign(design, 100 + seed)
         found = validate_one(observed, 1)
         standardised.append(found)

@@ -75,7 +75,7 @@ def test_a_file_is_accepted_just_where_all_scale_readings_are_inside(tmp_path: P
     """Readings as the design has them, in random places with random probes."""
     generator = np.random.default_rng(5)
     accepted = 0
-    for _ in range(120):
+    for _ in range(40):
         offset, at = (
             generator.uniform(-0.3, 0.3, 3).round(3),
             generator.uniform(-0.3, 0.9, 3).round(3),
@@ -101,7 +101,7 @@ def test_a_file_is_accepted_just_where_all_scale_readings_are_inside(tmp_path: P
             with pytest.raises(ExperimentError, match=wording.PUTS_THE_SCALES):
                 load(path)
         accepted += expected
-    assert 5 < accepted < 115
+    assert 1 < accepted < 39
 
 
 def test_readings_outside_are_told_by_fit(
