@@ -225,16 +225,6 @@ def test_what_a_model_rests_on_may_not_change(folder: Path, tmp_path: Path) -> N
             bp.load_map(own / "map.yaml")
 
 
-def test_a_map_beside_its_model_may_move_with_it(folder: Path, tmp_path: Path) -> None:
-    own = tmp_path / "first"
-    own.mkdir()
-    write_files(own)
-    right = fit_of("machine file", own).to_map()
-    bp.write_map(right, own / "map.yaml")
-    own.rename(tmp_path / "second")
-    assert same(bp.load_map(tmp_path / "second" / "map.yaml"), right)
-
-
 def test_fit_writes_a_map_of_the_full_estimator_only(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

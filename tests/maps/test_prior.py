@@ -283,10 +283,6 @@ CASES = {
         },
         "the map states no date",
     ),
-    "no drift": (
-        {"priors": [{"kind": "map", "file": "first.yaml", "years": 1}]},
-        "an age needs a drift",
-    ),
 }
 
 

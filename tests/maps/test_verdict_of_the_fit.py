@@ -107,20 +107,6 @@ def test_a_reversal_has_the_verdict_of_multiple_redundancy() -> None:
         assert words in found.complaint and bool(words) == bool(found.complaint)
 
 
-def test_a_deficient_fit_beyond_the_limit_says_both() -> None:
-    corner = {"x": "0 mm", "y": "0 mm"}
-    positions = [
-        {"name": level, "plane": "z", "level": level, "corner": corner, "probes": ["down"]}
-        for level in ("100 mm", "300 mm", "500 mm", "700 mm")
-    ]
-    one_probe = {"calibration": [], "probes": {"down": ["0 mm"] * 3}, "positions": positions}
-    experiment = small_quickstart(**one_probe)
-    readings = bp.simulate(experiment)
-    readings["z_mm"] += np.arange(len(readings)) % 2
-    told = bp.fit(experiment, readings).complaint
-    assert "rank deficiency" in told and "beyond the limit" in told
-
-
 OF_MAPS = [
     ["correct", "MAP", "points.csv"],
     ["map", "MAP", "--grid", "2,2,2"],

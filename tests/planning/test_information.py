@@ -280,44 +280,6 @@ CERTIFIED = """calibration:
 """
 
 
-def test_artefacts_that_are_left_out_do_not_count(tmp_path: Path) -> None:
-    (experiment,) = load(written(tmp_path, TWO_PLATES), planning=True)
-    assert experiment.pool is not None
-    problem = problem_of(experiment, "U6")
-    names = [candidate.name for candidate in experiment.pool.candidates]
-    for wanted in (
-        ["a", "b", "of small"],
-        ["c", "d", "of large"],
-        ["a", "b", "c", "of small", "of large"],
-    ):
-        chosen = [names.index(name) for name in wanted]
-        full = predict(with_chosen(experiment, [experiment.pool.candidates[k] for k in chosen]))
-        assert full.verdict.deficiency == 0
-        assert value(problem, chosen) == pytest.approx(full.quantities["U6"].average, rel=1e-9)
-    # Neither the sides of the one nor those of the other tell squareness, and nothing else is
-    # shared.
-    chosen = [names.index(name) for name in ("a", "d", "of small", "of large")]
-    full = predict(with_chosen(experiment, [experiment.pool.candidates[k] for k in chosen]))
-    assert full.verdict.deficiency == 1 and value(problem, chosen) == np.inf
-
-
-def test_a_plate_that_nothing_places_leaves_its_own_distances_undetermined(tmp_path: Path) -> None:
-    """Whatever certificates say: the choice that is written has no such plate, so that `run` counts
-    the others only.
-    """
-    certified = TWO_PLATES.replace("pool:\n", CERTIFIED + "pool:\n")
-    (experiment,) = load(written(tmp_path, certified), planning=True)
-    assert experiment.pool is not None
-    names = [candidate.name for candidate in experiment.pool.candidates]
-    for name in ("U5", "U5-maximum"):
-        problem = problem_of(experiment, name)  # type: ignore[arg-type]
-        for wanted in (["a", "b"], ["c", "d"], ["a", "b", "of small", "of large"]):
-            assert value(problem, [names.index(one) for one in wanted]) == np.inf
-        chosen = [names.index(one) for one in ("a", "b", "c")]
-        full = predict(with_chosen(experiment, [experiment.pool.candidates[k] for k in chosen]))
-        assert value(problem, chosen) == pytest.approx(in_full(full, name), rel=1e-9)  # type: ignore[arg-type]
-
-
 @pytest.mark.parametrize("positions", [2, 4])
 def test_two_plates_of_unlike_certificates(tmp_path: Path, positions: int) -> None:
     (experiment,) = load(

@@ -175,23 +175,6 @@ def test_derivatives_are_those_of_finite_differences(name: CriterionName) -> Non
     assert now > 0
 
 
-def test_criteria_of_parameters_by_their_definitions() -> None:
-    problem = problem_of("A")
-    chosen = tuple(range(SIZE))
-    scaled = problem.criterion.scaled
-    own = problem.information.shared
-    covariance = scaled @ np.linalg.inv(problem.information.of(chosen))[own, own] @ scaled.T
-    sizes = np.sqrt(np.linalg.eigvalsh(covariance))
-    expected = {
-        "A": np.sqrt(np.trace(covariance) / len(covariance)),
-        "D": np.exp(np.linalg.slogdet(covariance)[1] / (2 * len(covariance))),
-        "E": sizes[-1],
-        "condition": sizes[-1] / sizes[0],
-    }
-    for name, number in expected.items():
-        assert value(problem_of(name), chosen) == pytest.approx(number, rel=1e-8)  # type: ignore[arg-type]
-
-
 def test_the_number_of_workers_changes_nothing() -> None:
     """And gains are what a selection is without and with."""
     request = Request("U6", Budget(positions=3))

@@ -103,18 +103,6 @@ def test_composed_names_alone_become_short_and_none_is_there_twice(pool: Path) -
             assert said["names"][position.description] == name
 
 
-def test_the_file_and_the_sheet_take_probes_in_the_same_order(pool: Path) -> None:
-    sheet = pool.with_name("day.html")
-    said = planned(pool, "day.yaml", "--positions", "6", "--sheet", str(sheet))
-    steps = said["run_sheet"]["steps"]  # type: ignore[index, call-overload]
-    written = poses(pool.with_name("day.yaml"))
-    assert [step["name"] for step in steps] == list(written)
-    assert [step["probes"] for step in steps] == [list(one.probes) for one in written.values()]
-    assert [step["description"] or "" for step in steps] == [
-        one.description for one in written.values()
-    ]
-
-
 def test_a_campaign_goes_on_under_the_names_that_it_began_with(
     pool: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cache
 
-import ballplate as bp
 import numpy as np
 import pytest
 import scipy.stats
@@ -22,6 +21,7 @@ from ballplate.simulator.readings.observed_readings import ObservedReadings, obs
 from numpy.typing import NDArray
 
 from tests.reference import dense
+from tests.reference.small_quickstart import small_quickstart
 
 Real = NDArray[np.float64]
 
@@ -30,9 +30,8 @@ Real = NDArray[np.float64]
 def small() -> Experiment:
     """Sixteen balls in six positions."""
     plate = {"plate": {"kind": "grid", "balls": [4, 4], "size": ["750 mm", "750 mm"]}}
-    model = {"kind": "kinematic", "position_coefficients": 3, "rotation_coefficients": 2}
     points = {"points": {"random": 12, "seed": 3}, "probe": "down"}
-    return bp.quickstart().with_({"artefacts": plate, "error_model": model, "evaluation": points})
+    return small_quickstart(artefacts=plate, evaluation=points)
 
 
 def campaign(design: Design, seed: int, certificate: int | None = None) -> ObservedReadings:

@@ -50,14 +50,6 @@ def write(
     return str(path)
 
 
-def test_balls_may_be_outside_where_the_scales_are_inside(tmp_path: Path) -> None:
-    """193 mm below the volume, on a probe of 400 mm."""
-    path = write(tmp_path, level="-193 mm")
-    assert main(["simulate", path, "--exact", "-o", str(tmp_path / "r.csv")]) == 0
-    z = [float(line.split(",")[-1]) for line in (tmp_path / "r.csv").read_text().splitlines()[1:]]
-    assert z == pytest.approx([207.0] * 9)
-
-
 def test_scale_readings_outside_are_refused_though_the_balls_are_inside(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -493,21 +493,3 @@ def test_a_pool_of_a_file(tmp_path: Path) -> None:
     assert any(change.candidate >= 0 for change in first.changes)
     after = check(written_out(said, first, tmp_path)).verdict
     assert not after.deficiency and not after.weak
-
-
-def test_suggestions_do_not_ask_for_all_candidates_in_one_design(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Parameters of influence quantities that each candidate brings do not add up."""
-    each = {"kind": "reproducibility", "each": ["position", "ball"], "standard_uncertainty": "1 um"}
-    few = {"balls": [2, 2], "size": ["500 mm", "500 mm"], "kind": "grid"}
-    base = load("designs/quickstart.yaml")[0].with_(
-        {"influences": [each], "artefacts.plate": few, "error_model": {"kind": "metric"}}
-    )
-    deficient = replace(base, positions=base.positions[:1])
-    at_large = repairs(deficient)
-    most = lay_out(deficient).parameter_count + 100
-    monkeypatch.setattr("ballplate.simulator.experiment.influences.MOST_SHARED", most)
-    limited = repairs(deficient)
-    assert limited.repairs
-    assert [one.edits for one in limited.repairs] == [one.edits for one in at_large.repairs]

@@ -163,14 +163,6 @@ def test_the_hours_are_those_of_the_shortest_plan(tmp_path: Path) -> None:
     assert not judge(goal, less.prediction).is_met
 
 
-def test_a_pool_alone_is_no_design(tmp_path: Path) -> None:
-    path = tmp_path / "pool.yaml"
-    path.write_text(TEXT, encoding="utf-8")
-    (experiment,) = load(path, planning=True)
-    with pytest.raises(bp.ExperimentError, match="positions: missing"):
-        reach(experiment, parse_goal("U6 average 1 um"), ("hours",))
-
-
 def test_a_certificate_is_varied_with_what_its_values_have_in_common() -> None:
     """One certificate states both parts; its limit is that of a plate of which all is known."""
     item = {"kind": "distances", "pairs": "corner sides", "standard_uncertainty": "0.2 um"}
