@@ -136,7 +136,7 @@ def test_the_best_or_near_it_under_many_limits(name: CriterionName, limited: Con
 
 @pytest.mark.parametrize("name", ["U6", "U6-maximum", "E"])
 def test_the_bound_is_near_for_some_positions(name: CriterionName) -> None:
-    limited = replace(problem_of(name).constraints, budget=Budget(positions=3))
+    limited = replace(problem_of(name).constraints, budget=Budget(positions=4))
     found = bound(replace(problem_of(name), constraints=limited))
     best = min(value(problem_of(name), chosen) for chosen in every() if limited.allows(chosen))
     assert found is not None
