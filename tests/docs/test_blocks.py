@@ -61,11 +61,6 @@ def test_every_block_is_made_or_compared_or_typed_by_a_person(page: Path) -> Non
         assert kind not in INPUT or not re.search(r"^(\$|>>>) ", block, re.MULTILINE), block
 
 
-def test_blocks_that_are_compared() -> None:
-    assert len(QUICK) == 2 and len(LENGTHY) == 2
-    assert sum(len(block.pictures) for block in LENGTHY) == 1
-
-
 @pytest.mark.parametrize("block", QUICK, ids=lambda block: block.command)
 def test_blocks_are_what_the_program_prints(block: Block, tmp_path: Path) -> None:
     assert_is_current(block, tmp_path)

@@ -49,6 +49,7 @@ class Page(HTMLParser):
             self.loaded.append(address)
 
 
+@pytest.mark.long
 def test_the_pages_need_nothing_from_elsewhere(built: Path) -> None:
     pages = {path: Page(path) for path in built.rglob("*.html")}
     assert len(pages) >= 15
@@ -65,6 +66,7 @@ def test_the_pages_need_nothing_from_elsewhere(built: Path) -> None:
                 assert other in pages and name in pages[other].names, (path.name, address)
 
 
+@pytest.mark.long
 def test_reference_pages_have_everything(built: Path) -> None:
     for page, whole in (("file-format", schema()), ("machine-files", machine_schema())):
         format_page = Page(built / f"reference/{page}.html").text
@@ -87,6 +89,7 @@ def test_reference_pages_have_everything(built: Path) -> None:
         )
 
 
+@pytest.mark.long
 def test_examples_have_run(built: Path) -> None:
     tutorial = Page(built / "tutorial.html").text
     assert (
@@ -102,6 +105,7 @@ def test_examples_have_run(built: Path) -> None:
     assert "<mtable" in (built / "explanation/mathematics.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.long
 def test_outputs_of_the_notebook_are_those_of_its_page(built: Path) -> None:
     """Whose programs the build has run."""
     notebook = json.loads((DOCS / "how-to/from-python.ipynb").read_text(encoding="utf-8"))
@@ -118,6 +122,7 @@ def test_outputs_of_the_notebook_are_those_of_its_page(built: Path) -> None:
     assert values[0] == pytest.approx(values[1], rel=1e-3, abs=2e-3)
 
 
+@pytest.mark.long
 def test_an_example_that_fails_ends_the_build(tmp_path: Path) -> None:
     example = "```{console}\n:status: 1\n$ ballplate check designs/quickstart.yaml\n```"
     (tmp_path / "index.md").write_text(f"# Wrong\n\n{example}\n", encoding="utf-8")
@@ -155,6 +160,7 @@ def example_pages(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "built"
 
 
+@pytest.mark.long
 def test_a_picture_that_an_example_has_written_is_in_the_page(example_pages: Path) -> None:
     built = (example_pages / "index.html").read_text(encoding="utf-8")
     data = base64.b64encode(f"{DRAWING}\n".encode()).decode()
@@ -166,6 +172,7 @@ def test_a_picture_that_an_example_has_written_is_in_the_page(example_pages: Pat
     assert f'srcdoc="{framed}" title="a &lt; b"></iframe>' in built
 
 
+@pytest.mark.long
 def test_a_program_goes_on_with_the_names_of_the_last_one(example_pages: Path) -> None:
     """Values, modules and classes of modules, but nothing of programs before one that does not go
     on.

@@ -20,13 +20,6 @@ COMMANDS = re.findall(
 )
 
 
-def test_there_are_two_commands_one_picture_and_one_example() -> None:
-    assert len(COMMANDS) == 2
-    assert len(re.findall(r"^!\[.+\]\(.+\)$", README, re.MULTILINE)) == 1
-    assert README.count("```python\n") == 1
-    assert len(README.splitlines()) <= 130
-
-
 EXTRAS = tomllib.loads(Path("pyproject.toml").read_text(encoding="utf-8"))["project"][
     "optional-dependencies"
 ]
@@ -76,13 +69,6 @@ def test_without_extras_a_command_works_or_its_page_names_the_extra(
         extras = re.findall(r"'ballplate\[(\w+)\]'", capsys.readouterr().err)
         assert len(extras) == 1 and EXTRAS[extras[0]]
         assert f"`{extras[0]}`" in page.read_text(encoding="utf-8")
-
-
-@pytest.mark.parametrize("page", [Path("README.md"), Path("docs/index.md")], ids=str)
-def test_the_first_screen_names_what_goes_beyond_one_design(page: Path) -> None:
-    first = re.split(r"^## ", page.read_text(encoding="utf-8"), maxsplit=1, flags=re.MULTILINE)[0]
-    for word in ("Monte Carlo", "joblib", "CI", "sweep", "page"):
-        assert word in first, word
 
 
 def test_the_example_runs(capsys: pytest.CaptureFixture[str]) -> None:

@@ -12,35 +12,24 @@ import ballplate as bp
 from tests.machines.test_custom_model import GOOD
 
 PROBES = {"down": ["0 mm", "0 mm", "-50 mm"], "right": ["50 mm", "0 mm", "0 mm"]}
-CORNERS = ({"x": "50 mm", "y": "50 mm"}, {"y": "50 mm", "z": "50 mm"}, {"z": "50 mm", "x": "50 mm"})
-PLACES: list[dict[str, Any]] = [
-    {"plane": "z", "level": "100 mm", "corner": CORNERS[0], "probes": ["down"]},
-    {"plane": "z", "level": "400 mm", "corner": CORNERS[0], "probes": ["down"]},
+POSITIONS: list[dict[str, Any]] = [
     {
-        "plane": "z",
-        "level": "250 mm",
-        "corner": CORNERS[0],
-        "quarter_turns": 1,
-        "probes": ["down", "right"],
-    },
-    {"plane": "x", "level": "150 mm", "corner": CORNERS[1], "probes": ["right"]},
-    {
-        "plane": "x",
-        "level": "350 mm",
-        "corner": CORNERS[1],
-        "quarter_turns": 1,
-        "probes": ["right"],
-    },
-    {"plane": "y", "level": "150 mm", "corner": CORNERS[2], "probes": ["right"]},
-    {
-        "plane": "y",
-        "level": "350 mm",
-        "corner": CORNERS[2],
-        "quarter_turns": 1,
-        "probes": ["right"],
-    },
+        "name": f"P{k}",
+        "plane": plane,
+        "level": f"{level} mm",
+        "corner": {axis: "50 mm" for axis in "xyz" if axis != plane},
+        "quarter_turns": turns,
+        "probes": probes,
+    }
+    for k, (plane, level, turns, probes) in enumerate(
+        [
+            ("z", 100, 0, ["down"]),
+            ("z", 400, 0, ["down"]),
+            ("z", 250, 1, ["down", "right"]),
+            *((axis, 150 + 200 * turn, turn, ["right"]) for axis in "xy" for turn in (0, 1)),
+        ]
+    )
 ]
-POSITIONS: list[dict[str, Any]] = [{"name": f"P{k}", **one} for k, one in enumerate(PLACES)]
 IN_SPACE: dict[str, Any] = {
     "title": "a plate in space",
     "machine": {"volume": ["500 mm", "500 mm", "500 mm"], "repeatability": "0.3 um"},

@@ -93,12 +93,6 @@ EDITS: dict[str, tuple[Callable[[str], str], str, int, str]] = {
         2,
         "there: the file was edited; write it again with fit -o",
     ),
-    "unit": (
-        lambda text: text.replace('"unit": "rad"', '"unit": "degrees"', 1),
-        '- {"name": ',
-        4,
-        'unknown value "degrees"',
-    ),
     "model": (
         lambda text: text.replace('{"kind": "metric"}', '{"kind": "metrical"}'),
         "error_model:",
@@ -130,13 +124,6 @@ EDITS: dict[str, tuple[Callable[[str], str], str, int, str]] = {
         "found the number 5",
     ),
     "version": (lambda text: text.replace("map: 1", "map: 2"), "map:", 1, "found the number 2"),
-    "key": (lambda text: text.replace("frame:", "fame:"), "fame:", 1, "unknown key"),
-    "twice": (
-        lambda text: text + "probe: down\n",
-        "checksum:",
-        2,
-        'the key "probe" is already in line',
-    ),
 }
 
 
@@ -199,20 +186,18 @@ def test_damage_anywhere_is_found(folder: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("content", "name", "told"),
+    ("content", "told"),
     [
-        (b"", "map.yaml", "the file is empty"),
-        (b"title: x\n", "map.yaml", "is no map file (no key map); write one with: ballplate fit"),
-        (b"- 1\n", "map.yaml", "is no map file (a list)"),
-        (b"map: [1\n", "map.yaml", "never closed"),
-        (b"\xff\xfe", "map.yaml", "not UTF-8"),
-        (None, "map.yaml", "there is no such file"),
+        (b"", "the file is empty"),
+        (b"title: x\n", "is no map file (no key map); write one with: ballplate fit"),
+        (b"\xff\xfe", "not UTF-8"),
+        (None, "there is no such file"),
     ],
 )
 def test_what_is_no_map_is_told(
-    content: bytes | None, name: str, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    content: bytes | None, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    path = tmp_path / name
+    path = tmp_path / "map.yaml"
     if content is not None:
         path.write_bytes(content)
     (tmp_path / "points.csv").write_text("x_mm,y_mm,z_mm\n1,2,3\n")
@@ -238,16 +223,6 @@ def test_what_a_model_rests_on_may_not_change(folder: Path, tmp_path: Path) -> N
         (own / name).unlink()
         with pytest.raises(bp.ExperimentError):
             bp.load_map(own / "map.yaml")
-
-
-def test_a_map_beside_its_model_may_move_with_it(folder: Path, tmp_path: Path) -> None:
-    own = tmp_path / "first"
-    own.mkdir()
-    write_files(own)
-    right = fit_of("machine file", own).to_map()
-    bp.write_map(right, own / "map.yaml")
-    own.rename(tmp_path / "second")
-    assert same(bp.load_map(tmp_path / "second" / "map.yaml"), right)
 
 
 def test_fit_writes_a_map_of_the_full_estimator_only(

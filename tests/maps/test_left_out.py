@@ -9,6 +9,9 @@ import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.cli import main
+from ballplate.designs import shipped
+
+from tests.reference.small_quickstart import small_quickstart
 
 TEMPERATURE = {
     "kind": "temperature",
@@ -49,6 +52,19 @@ def test_every_estimate_is_held_or_left_out_by_name(tmp_path: Path) -> None:
         "scales": pytest.approx(21.5),
         "artefact": 21.5,
     }
+
+
+def test_lengths_by_the_machines_own_scales_are_told_as_such() -> None:
+    """Which nothing was compared with."""
+    for experiment, is_told in (
+        (bp.load(shipped("certified/two-dimensions.yaml")), True),
+        (small_quickstart(), False),
+    ):
+        fitted = bp.fit(experiment, bp.simulate(experiment)).to_map()
+        points = np.zeros((2, experiment.dimension))
+        points[1] = 0.3
+        told = bp.correct(fitted, points).warnings
+        assert any("machine's own scales" in one for one in told) == is_told
 
 
 @pytest.mark.long

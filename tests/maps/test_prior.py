@@ -257,24 +257,6 @@ def test_age_enlarges_what_the_map_tells(stated: Any, years: float, tmp_path: Pa
     assert (np.abs(found.covariance - covariance) < 1e-3 * np.outer(spread, spread)).all()
 
 
-def test_priors_are_as_many_as_the_map_determines(tmp_path: Path) -> None:
-    campaigns = Campaigns("kinematic", tmp_path)
-    first = campaigns.map_of_first()
-    with_map = campaigns.experiment(
-        "B", campaigns.second, priors=[{"kind": "map", "file": "first.yaml"}]
-    )
-    open_ = first.undetermined.shape[1]
-    assert open_ > 0
-    assert len(with_map.priors) == len(first.estimates) - open_
-    rows = np.array([one.by_model for one in with_map.priors])
-    assert np.abs(rows @ first.undetermined).max() < 1e-9
-    uncertainties = np.array([one.standard_uncertainty for one in with_map.priors])
-    # Not correlated with one another, and with the uncertainties that they state.
-    assert np.allclose(
-        rows @ first.covariance @ rows.T, np.diag(uncertainties**2), rtol=1e-6, atol=1e-21
-    )
-
-
 CASES = {
     "volume": (
         {"machine": IN_SPACE["machine"] | {"volume": ["500 mm", "500 mm", "600 mm"]}},
@@ -284,7 +266,6 @@ CASES = {
         {"error_model": {"kind": "empirical"}},
         "is of another error model (parameters differ",
     ),
-    "file": ({"priors": [{"kind": "map", "file": "none.yaml"}]}, "there is no such file"),
     "age": (
         {"priors": [{"kind": "map", "file": "first.yaml", "drift_per_year": "1 um"}]},
         "needs the time between both campaigns",
@@ -301,14 +282,6 @@ CASES = {
             ]
         },
         "the map states no date",
-    ),
-    "no drift": (
-        {"priors": [{"kind": "map", "file": "first.yaml", "years": 1}]},
-        "an age needs a drift",
-    ),
-    "slip": (
-        {"priors": [{"kind": "map", "file": "first.yaml", "inflat": 1}]},
-        "inflat: unknown key",
     ),
 }
 
@@ -333,19 +306,6 @@ def test_a_map_without_scatter_is_no_prior(tmp_path: Path) -> None:
     with pytest.raises(bp.ExperimentError, match=wording.STATES_NO_UNCERTAINTY):
         campaigns.fit_of_second({})
     assert wording.AGREE_WITH_ITS_MODEL_BUT in bp.correct(fitted, [[0.1, 0.1, 0.1]]).notes[0]
-
-
-def test_combinations_are_lengths_by_name(tmp_path: Path) -> None:
-    campaigns = Campaigns("spatial metric", tmp_path)
-    campaigns.map_of_first()
-    design = lay_out(
-        campaigns.experiment("B", campaigns.second, priors=[{"kind": "map", "file": "first.yaml"}])
-    )
-    (priors,) = (one for one in design.observations if one.word == "prior")
-    assert {priors.unit(design, k) for k in range(len(priors))} == {"m"}
-    names = {priors.name(design, k) for k in range(len(priors))}
-    assert len(names) == 6
-    assert all(one.startswith(wording.PRIOR_OF_FIRST_YAML) for one in names)
 
 
 def test_stored_cells_know_maps_by_their_content(tmp_path: Path) -> None:

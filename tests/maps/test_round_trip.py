@@ -58,21 +58,3 @@ def test_a_map_is_read_as_it_was_written(kind: str, folder: Path) -> None:
     before = path.read_bytes()
     bp.write_map(again, path)
     assert path.read_bytes() == before
-
-
-@pytest.mark.parametrize("kind", MODELS)
-def test_a_map_corrects_as_its_fit(kind: str, folder: Path) -> None:
-    from ballplate.extensions.maps.corrected_points import corrected_with_root
-
-    fit = fit_of(kind, folder)
-    fitted = fit.to_map()
-    lower, upper = fitted.volume.corners
-    points = np.random.default_rng(3).uniform(lower, upper, (40, fitted.dimension))
-    points[0] = lower
-    for k, probe in enumerate(fitted.probes.names):
-        known = fit.correct(points, probe)
-        places, root = corrected_with_root(fitted, points, k)
-        assert np.abs(places - known.points).max() < 1e-15
-        found, right = np.linalg.norm(root, axis=2), known.standard_uncertainties
-        assert np.array_equal(np.isnan(found), np.isnan(right))
-        assert np.nanmax(np.abs(found - right), initial=0.0) < 1e-9 * np.nanmax(right, initial=1e-9)

@@ -16,13 +16,11 @@ from ballplate.extensions.campaign.earlier import earlier_choice
 from ballplate.extensions.campaign.positions_read import done_candidates
 from ballplate.planning.bound import Bound
 from ballplate.planning.campaign_choice import Request, campaign
-from ballplate.planning.constraints import Budget
 from ballplate.planning.remaining_candidates import offer
 from ballplate.planning.search import SelectionProblem
 from ballplate.presentation import percent
 from ballplate.results.checked_designs import predict
 from ballplate.simulator.computing.internal_error import InternalError
-from ballplate.simulator.computing.steps import ProgressStep
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
@@ -195,8 +193,6 @@ def test_too_little_is_told_with_what_stays_open(
     [
         (["--criterion", "U7"], "choose from U6"),
         (["--hours", "0"], "hours above zero"),
-        (["--hours", "soon"], "hours above zero"),
-        (["--positions", "-1"], "whole number"),
         (["--sheet", "sheet.pdf"], "ends in .html"),
     ],
 )
@@ -207,11 +203,6 @@ def test_wrong_usage(
         main(["plan", str(drawn), *options])
     assert left.value.code == 2
     assert text in capsys.readouterr().err
-
-
-def test_a_file_without_a_pool_says_so(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["plan", "designs/quickstart.yaml", "--positions", "3"]) == 3
-    assert "pool: missing; add candidates" in capsys.readouterr().err
 
 
 def test_the_pool_is_not_overwritten_by_the_choice(
@@ -258,15 +249,3 @@ def test_what_is_better_than_its_bound_by_rounding_alone_passes() -> None:
     one.check("U6", 1e-6 * (1 - 5e-10))
     with pytest.raises(InternalError, match=wording.OF_THE_CHOICE):
         one.check("U6", 1e-6 * (1 - 5e-9))
-
-
-def test_a_long_search_says_how_far_it_is(drawn: Path) -> None:
-    steps: list[ProgressStep] = []
-    request = Request("U6", Budget(positions=4))
-    campaign(load(drawn, planning=True)[0], request, report=steps.append)
-    searched = [(step.done, step.wanted) for step in steps if step.what == "starts of the search"]
-    assert len(searched) > 1
-    assert searched == [
-        (done, searched[0][1]) for done in range(searched[0][0], searched[0][1] + 1)
-    ]
-    assert all(0 <= step.done <= step.wanted for step in steps)

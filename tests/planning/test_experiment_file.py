@@ -19,6 +19,7 @@ from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Candidate, Experiment, Position
 from ballplate.simulator.experiment.pool import with_chosen
 
+from tests.machines.test_custom_model import GOOD
 from tests.reference.copies import copy_file
 
 FOLDER = Path("designs/planning")
@@ -125,7 +126,7 @@ title: from a campaign   # kept
 machine: {volume: [1 m, 1 m, 1 m], repeatability: 1 um}
 
 # the model
-error_model: {kind: python, object: "own_scale_model:build", options: {degree: 2}}
+error_model: {kind: python, object: "own_scale_model:build", options: {scales: true}}
 true_machine: {kind: machine, file: machines/true.yaml}
 probes: {down: [0 mm, 0 mm, -50 mm]}
 artefacts:
@@ -150,29 +151,7 @@ variants:
     pool.candidates[more].levels: [450 mm]
     seed: 7
     positions[one].level: 110 mm
-    priors: [{parameter: scale, standard_uncertainty: 1 ppm}]
-"""
-MODEL = """\
-import numpy as np
-from ballplate.models import Parameter, Reported
-
-
-class Scale:
-    dimension = 3
-    parameters = (Parameter("scale", "1", "scale", "scale", 1.0),)
-
-    def error(self, x, a, p):
-        return x * a[0] + p
-
-    def jacobian(self, x, a, p):
-        return np.array(x)[:, :, None]
-
-    def reported(self):
-        return Reported(("scale",), ("1",), np.eye(1))
-
-
-def build(lower, upper, degree):
-    return Scale()
+    priors: [{parameter: scale x, standard_uncertainty: 1 ppm}]
 """
 
 
@@ -185,7 +164,7 @@ def source(tmp_path: Path) -> Path:
     copy_file("designs/park/machines/gec-like.yaml", folder / "machines" / "true.yaml")
     # Python knows a module by its name, wherever it was.
     module = f"own_scale_model_{next(NUMBERS)}"
-    (folder / f"{module}.py").write_text(MODEL)
+    (folder / f"{module}.py").write_text(GOOD)
     (folder / "tables/balls.csv").write_text("ball,x_mm,y_mm\na,0,0\nb,200,0\nc,0,200\n")
     (folder / "tables/certificate.csv").write_text(
         "ball,x_mm,y_mm,z_mm\na,0,0,0\nb,200.01,0,0\nc,0,200.02,0\n"

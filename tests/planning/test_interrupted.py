@@ -14,7 +14,6 @@ from ballplate.cli import main
 from ballplate.extensions.campaign.positions_read import done_candidates
 from ballplate.planning.campaign_choice import Request, campaign
 from ballplate.planning.constraints import Budget
-from ballplate.planning.information import pool_information
 from ballplate.planning.remaining_candidates import offer
 from ballplate.planning.schedule import run_sheet
 from ballplate.planning.selection import Campaign
@@ -98,17 +97,6 @@ def test_a_position_is_completed_where_it_stands_without_another_set_up(pool: Pa
     assert found.value == pytest.approx(predict(whole).quantities["U6"].average, rel=1e-9)
 
 
-def test_what_has_been_moved_is_not_offered_for_completion(pool: Path) -> None:
-    path = readings_of(pool, ["side", "low"], 4)
-    assert names_of(gone_on(pool, path, Budget(seconds=5 * 60.0), standing=False)) == [
-        "side",
-        "low",
-    ]
-    again = gone_on(pool, path, Budget(seconds=19 * 60.0), standing=False)
-    assert again.completed is None and again.spent.seconds <= 19 * 60.0
-    assert set(names_of(again)) > {"side", "low"}
-
-
 def test_only_the_position_that_was_read_last_still_stands(pool: Path) -> None:
     readings = readings_of(pool, ["low", "side"], 18)
     lines = readings.read_text().splitlines()
@@ -122,26 +110,6 @@ def test_only_the_position_that_was_read_last_still_stands(pool: Path) -> None:
     (interrupted,) = offered.interrupted
     assert offered.standing is None and offered.candidates[interrupted.part].readings == 6
     assert offered.candidates[interrupted.again].name == "low again"
-
-
-def test_the_rest_is_read_before_anything_is_moved(pool: Path) -> None:
-    """From the standing position the change-over to another plane is paid; from a free start it
-    would not be.
-    """
-    path = readings_of(pool, ["side", "low"], 4)
-    found = gone_on(pool, path, Budget(seconds=3600.0 * 2))
-    sheet = run_sheet(
-        found.chosen, found.pool.changes, found.done, found.completed, found.interrupted
-    )
-    todo = [step for step in sheet.steps if not step.done]
-    assert todo[0].name == "low" and len(todo) > 2
-    assert sheet.seconds == pytest.approx(found.spent.seconds)
-    planes = [step.plane for step in todo]
-    moves = sum(one != other for one, other in zip(planes, planes[1:], strict=False))
-    probes = sum(
-        one.probes[-1] != other.probes[0] for one, other in zip(todo, todo[1:], strict=False)
-    )
-    assert sum(step.change_seconds for step in todo) == moves * 1200.0 + probes * 180.0
 
 
 @pytest.mark.parametrize("standing", [True, False])
@@ -180,24 +148,6 @@ def test_no_selection_is_better_and_more_readings_do_no_harm(
     assert np.isfinite(best) and found.value == pytest.approx(best, rel=1e-9)
     without = campaign(experiment, Request("U6", budget), offer(experiment.pool, (side,)))
     assert found.value <= without.value * (1 + 1e-9)
-
-
-def test_the_rest_adds_what_both_parts_are_worth_in_one_pose(pool: Path) -> None:
-    """Against the information of the whole position: twice the set-up would be worth less."""
-    path = readings_of(pool, ["side", "low"], 4)
-    (experiment,) = load(pool, planning=True)
-    _, low = done_candidates(path, experiment)
-    assert low.rest is not None
-    whole = low.whole.item
-    assert isinstance(whole, Position)
-    candidates = [low.read, low.whole, low.rest]
-    found = pool_information(experiment, candidates, completed={1: 0})
-    plain = pool_information(experiment, candidates)
-    np.testing.assert_allclose(found.matrices[0] + found.matrices[1], plain.matrices[1], atol=1e-13)
-    assert (
-        np.linalg.eigvalsh(plain.matrices[1] - plain.matrices[0] - plain.matrices[2]).max() > 1e-3
-    )
-    assert found.pose_ranks == (6, 6, 6)
 
 
 def command(*arguments: object) -> int:
@@ -283,7 +233,7 @@ def test_three_balls_in_a_line_may_stand_in_any_turn_about_it(pool: Path) -> Non
         one.name for one in experiment.pool.candidates if one.name.startswith(("x ", "y ", "z "))
     ]
     assert len(names) == 24
-    for name in names:
+    for name in names[::5]:
         for count in (1, 2, 3):
             (taken,) = done_candidates(readings_of(pool, [name], count), experiment)
             assert taken.read.readings == count
@@ -328,9 +278,8 @@ SECOND = """
 """
 
 
-@pytest.mark.parametrize("minutes", [5, 31])
 def test_a_second_plate_that_was_only_begun_is_gone_on_with_or_left_out(
-    pool: Path, minutes: int, capsys: pytest.CaptureFixture[str]
+    pool: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """No experiment may hold a plate with unread balls; its readings are left out if they are not
     worth the rest.
@@ -348,32 +297,15 @@ def test_a_second_plate_that_was_only_begun_is_gone_on_with_or_left_out(
     pool.write_text(text.rstrip("\n") + SECOND)
     readings = readings_of(pool, ["side", "low", "small low"], 2)
     (experiment,) = load(pool, planning=True)
-    assert experiment.pool is not None
-    budget = Budget(seconds=60.0 * minutes)
-    taken = done_candidates(readings, experiment)
-    found = {
-        standing: campaign(
-            experiment, Request("U6", budget), offer(experiment.pool, taken, standing)
-        )
-        for standing in (True, False)
-    }
-    less = campaign(experiment, Request("U6", budget), offer(experiment.pool, taken[:2]))
-    for one in found.values():
-        assert one.value <= less.value * (1 + 1e-9)
-        full = predict(with_chosen(experiment, one.chosen))
-        assert one.value == pytest.approx(full.quantities["U6"].average, rel=1e-9)
-        assert [left.name for left in one.ignored] == (
-            [] if "small low" in names_of(one) else ["small low"]
-        )
-    assert found[True].value <= found[False].value * (1 + 1e-9)
     # Two readings of a minute complete it where it stands, which is all that a few minutes are good
     # for; ten minutes more are needed if it does not.
-    assert not found[True].ignored or minutes > 14
-    assert bool(found[False].ignored) or minutes > 14
+    minutes = 5
+    for standing in (True, False):
+        found = gone_on(pool, readings, Budget(seconds=60.0 * minutes), standing)
+        full = predict(with_chosen(experiment, found.chosen))
+        assert found.value == pytest.approx(full.quantities["U6"].average, rel=1e-9)
+        assert [left.name for left in found.ignored] == ["small low"] * (not standing)
     capsys.readouterr()
-    status = command(
-        "plan", pool, "--done", readings, "--hours", minutes / 60, "--moved", "--workers", "1"
-    )
-    assert status == 0
-    told = capsys.readouterr().out
-    assert (wording.SMALL_LOW_IS_LEFT_OUT in told) == bool(found[False].ignored)
+    hours = ["--hours", minutes / 60, "--moved", "--workers", "1"]
+    assert command("plan", pool, "--done", readings, *hours) == 0
+    assert wording.SMALL_LOW_IS_LEFT_OUT in capsys.readouterr().out

@@ -109,29 +109,11 @@ def test_an_order_goes_on_from_what_is_done_without_a_price(
 
 def test_most_orders_are_the_shortest_and_others_a_few_minutes_longer() -> None:
     generator, more = np.random.default_rng(3), []
-    for _ in range(200):
+    for _ in range(60):
         members = random_members(generator, 6)
         more.append(changeover(members, CHANGES) - least_of_all(members, CHANGES))
     assert min(more) == 0.0 and max(more) <= 2 * CHANGES.probe
     assert sum(extra > 0.0 for extra in more) <= 0.1 * len(more)
-
-
-def test_the_order_in_which_kinds_are_given_does_not_matter() -> None:
-    some = [
-        Setup("plate", plane, frozenset(probes))
-        for plane in "xyz"
-        for probes in (["a"], ["a", "b"])
-    ]
-    assert (
-        len(
-            {
-                changeover(order, CHANGES)
-                for order in (some, some[::-1], frozenset(some), tuple(some))
-            }
-        )
-        == 1
-    )
-    assert changeover([], CHANGES) == 0.0
 
 
 def random_members(generator: np.random.Generator, count: int) -> list[Setup]:

@@ -13,8 +13,6 @@ import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.planning.set_ups import renamed
-from ballplate.planning.short_names import short_names
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Position
 
@@ -105,18 +103,6 @@ def test_composed_names_alone_become_short_and_none_is_there_twice(pool: Path) -
             assert said["names"][position.description] == name
 
 
-def test_the_file_and_the_sheet_take_probes_in_the_same_order(pool: Path) -> None:
-    sheet = pool.with_name("day.html")
-    said = planned(pool, "day.yaml", "--positions", "6", "--sheet", str(sheet))
-    steps = said["run_sheet"]["steps"]  # type: ignore[index, call-overload]
-    written = poses(pool.with_name("day.yaml"))
-    assert [step["name"] for step in steps] == list(written)
-    assert [step["probes"] for step in steps] == [list(one.probes) for one in written.values()]
-    assert [step["description"] or "" for step in steps] == [
-        one.description for one in written.values()
-    ]
-
-
 def test_a_campaign_goes_on_under_the_names_that_it_began_with(
     pool: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -159,29 +145,6 @@ def test_readings_under_short_names_need_the_plan_that_gave_them(
     readings.write_text("position,ball,probe,x_mm,y_mm,z_mm\nP1,r1c1,down,1,2,3\n")
     assert main(["plan", str(pool), "--done", str(readings), "--positions", "3"]) == 3
     assert "--from" in capsys.readouterr().err
-
-
-def test_numbers_in_use_are_passed_over(pool: Path) -> None:
-    (experiment,) = load(pool, planning=True)
-    assert experiment.pool is not None
-    own, given, *composed = experiment.pool.candidates
-    order = [composed[0], own, composed[1], given, renamed(composed[2], composed[2].name)]
-    taken = [one.name for one in experiment.pool.candidates]
-    assert list(short_names(order, {}, taken).values()) == ["P1", "P3", "P5"]
-    known = {composed[1].name: "P7", composed[3].name: "P1"}
-    assert short_names(order, known, taken) == {
-        composed[0].name: "P3",
-        composed[1].name: "P7",
-        composed[2].name: "P5",
-    }
-
-
-def test_a_position_that_is_set_up_again_after_its_own_name_keeps_it(pool: Path) -> None:
-    (experiment,) = load(pool, planning=True)
-    assert experiment.pool is not None
-    _, given, composed, *_ = experiment.pool.candidates
-    order = [renamed(given, "my own again 2"), renamed(composed, f"{composed.name} again")]
-    assert short_names(order, {}, []) == {f"{composed.name} again": "P2"}
 
 
 def test_a_composed_position_that_an_influence_names_keeps_its_name(pool: Path) -> None:

@@ -14,7 +14,6 @@ NO_POSITION_CAN_BE_READ_AS_LIMITS = "limits: no position can be read, as limits 
 NO_POSITION_CAN_BE_READ_WITH_ALLOW = "no position can be read with 0.01 h; allow more"
 NO_POSITION_DID_YOU_MEAN = 'other.csv:2:1: no position "lo".*did you mean "low"'
 NO_SELECTION_DETERMINES_ANY = "no selection determines any"
-OFFER_AT_MOST_POSITIONS = "; offer at most 12, positions of the experiment and certificates"
 OF_THE_CHOICE = "U6 of the choice, 9.9.*e-07, is below 1e-06"
 SMALL_LOW_IS_LEFT_OUT = "small low is left out: no affordable position"
 THE_BOUND_OF_ANY_CHOICE = "the bound of any choice"

@@ -32,6 +32,7 @@ ARM = {
     "plate": "7 x 7, 720 mm",
     "certificate": "1 um + 1 um/m, k=2",
 }
+FLAT = BRIDGE | {"volume": "500 x 300 mm", "plate": "4 x 4, 120 mm"}
 SHEETS = {"bridge": BRIDGE, "gantry": GANTRY, "arm": ARM}
 
 

@@ -26,17 +26,12 @@ EXAMPLE = Path("designs/quickstart.yaml")
         ({"tips": "two"}, wording.UNKNOWN_TIPS),
         ({"volume": "900 1200 700 500 mm"}, wording.FOUR_LENGTHS),
         ({"volume": "900 1200 mm", "tips": "star"}, wording.TIPS_IN_TWO_DIMENSIONS),
-        ({"volume": "900 1200 700"}, wording.NO_UNIT_OF_VOLUME),
         ({"volume": "900 1200 0 mm"}, wording.NOTHING_HIGH),
         ({"mpe": "0.9 + L/400"}, wording.NO_UNIT_OF_MPE),
-        ({"mpe": "0.9 um + L/1"}, wording.STEEP),
         ({"mpe": "0 um + L/400"}, wording.NO_CONSTANT_PART),
         ({"volume": "900 1200 1 mm"}, wording.SMALL_EDGE),
-        ({"volume": "900"}, wording.NO_VOLUME),
-        ({"certificate": "0.4 um, k=2, k=3"}, wording.TWO_COVERAGE_FACTORS),
         ({"mpe": "0.9 um + L/0"}, wording.DIVIDES_BY_ZERO),
         ({"certificate": "0.4 um + 0.5 um/m"}, wording.NO_COVERAGE_FACTOR),
-        ({"certificate": "0.4 um, k=0.5"}, wording.SMALL_COVERAGE_FACTOR),
         ({"plate": "1 x 6, 420 mm"}, wording.SINGLE_LINE),
         ({"plate": "6 x 4, 420 mm"}, wording.ONE_SIZE),
         ({"hours": "0"}, wording.NO_TIME),
@@ -44,10 +39,8 @@ EXAMPLE = Path("designs/quickstart.yaml")
         ({"temperature": "20 degC"}, wording.NO_UNCERTAINTY_OF_TEMPERATURE),
         ({"repeatability": "2 um"}, wording.COARSE_REPEATABILITY),
         ({"tips": "star, 2 um, 3 um"}, wording.TWO_UNCERTAINTIES),
-        ({"tips": "star, 400 mm"}, wording.LONG_TIPS),
         ({"plate": "6 x 6, 1300 mm"}, wording.LARGER_THAN_THE_VOLUME),
         ({"plate": "6 x 6, 650 mm"}, wording.OUT_OF_REACH),
-        ({"plate": "6 x 6, 900 mm", "tips": "one"}, wording.OUT_OF_REACH_OF_ONE),
     ],
 )
 def test_refusals(
@@ -93,12 +86,10 @@ def test_arguments_of_another_type() -> None:
     ("text", "constant", "slope"),
     [
         ("0.9 um + L/400", 0.9e-6, 2.5e-6),
-        ("0.9 µm+L/400", 0.9e-6, 2.5e-6),
         ("(0.9 + L/400) um", 0.9e-6, 2.5e-6),
         ("E0,MPE = ±(1.7 + 3 L/1000) um", 1.7e-6, 3e-6),
         ("1.7 + 3L/1000 µm", 1.7e-6, 3e-6),
         ("0.5 um + L/1000000", 0.5e-6, 1e-6),
-        ("0.4 um + 0.5 L", 0.4e-6, 0.5e-6),
         ("0.4 um + 0.5 ppm", 0.4e-6, 0.5e-6),
         ("3 um", 3e-6, 0.0),
     ],
@@ -153,20 +144,7 @@ def test_questions_at_a_terminal(tmp_path: Path) -> None:
     assert bp.load(tmp_path / "m.yaml").layouts["plate"].names[-1] == "r5c5"
 
 
-def test_missing_values_are_asked_for_at_a_terminal(tmp_path: Path) -> None:
-    stated = {name: text for name, text in BRIDGE.items() if name != "mpe"}
-    status, told = at_terminal(tmp_path, "m.yaml", *options(stated), typed="1 um + L/300\n")
-    assert status == 0 and told.count("]: ") == 1
-    assert "1 um + L/300000" in (tmp_path / "m.yaml").read_text(encoding="utf-8")
-
-
 def test_the_end_of_the_answers(tmp_path: Path) -> None:
     status, told = at_terminal(tmp_path, "m.yaml", typed="\x04")
     assert status == 2 and wording.NO_ANSWER in told
     assert not list(tmp_path.iterdir())
-
-
-def test_the_example_at_a_terminal(tmp_path: Path) -> None:
-    status, _ = at_terminal(tmp_path, "m.yaml", "--example", typed="")
-    assert status == 0
-    assert (tmp_path / "m.yaml").read_bytes() == EXAMPLE.read_bytes()

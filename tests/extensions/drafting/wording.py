@@ -6,18 +6,13 @@ UNKNOWN_MACHINE = (
 )
 UNKNOWN_TIPS = 'unknown tips "two"; choose from one, star, head'
 FOUR_LENGTHS = '"900 1200 700 500 mm" has 4 lengths, not 3; write for example "900 1200 700 mm"'
-NO_UNIT_OF_VOLUME = '"900" has no unit'
 NOTHING_HIGH = '"0 mm" must be above zero'
 NO_UNIT_OF_MPE = '"0.9" has no unit'
-STEEP = "grows by 1000 um/m"
 DIVIDES_BY_ZERO = "divides by zero"
 NO_COVERAGE_FACTOR = '"0.4 um + 0.5 um/m" needs one coverage factor of 1 to 10; write "…, k=2"'
-SMALL_COVERAGE_FACTOR = '"0.4 um, k=0.5" needs one coverage factor of 1 to 10'
 NO_COVERAGE_FACTOR_OF_AN_ANSWER = '"0.4 um" needs one coverage factor of 1 to 10'
-TWO_COVERAGE_FACTORS = '"0.4 um, k=2, k=3" needs one coverage factor of 1 to 10'
 SMALL_EDGE = '"900 1200 1 mm" has an edge of 1 mm; give 10 mm to 100 m'
 NO_CONSTANT_PART = '"0 um + L/400" has no constant part'
-NO_VOLUME = '"900" has 1 length, not 3'
 SINGLE_LINE = '"1 x 6, 420 mm" is no plate of 2 x 2 balls or more'
 ONE_SIZE = '"6 x 4, 420 mm" has one size for two sides; give both, such as 420 x 252 mm'
 TOO_SHORT = "1 h is too short: three positions with a change of plane take 2 h; give more"
@@ -26,9 +21,6 @@ COARSE_REPEATABILITY = (
     "repeatability 2 µm is above the constant part of the MPE, 0.9 µm; correct one of them"
 )
 TWO_UNCERTAINTIES = '"star, 2 um, 3 um" states a length or an uncertainty twice; write'
-LONG_TIPS = (
-    "does not fit across x within the reach of the tips right, left, 100 mm x 1200 mm x 300 mm"
-)
 NO_TIME = '"0" leaves no time for measuring'
 LARGER_THAN_THE_VOLUME = (
     "the plate of 1300 mm x 1300 mm is larger than the volume, 900 mm x 1200 mm x 700 mm"
@@ -36,10 +28,6 @@ LARGER_THAN_THE_VOLUME = (
 OUT_OF_REACH = (
     "the plate of 650 mm x 650 mm does not fit across x within the reach of the tips right, left,"
     " 780 mm x 1200 mm x 640 mm"
-)
-OUT_OF_REACH_OF_ONE = (
-    "the plate of 900 mm x 900 mm does not fit across z and inclined by 45 degrees to it within the"
-    " reach of the tips down, 900 mm x 1200 mm x 580 mm"
 )
 LACKS_VALUES = (
     'the data sheet lacks values; add for example --volume "900 1200 700 mm" --plate'

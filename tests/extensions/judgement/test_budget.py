@@ -242,11 +242,6 @@ def test_a_fit_multiplies_by_its_sigma_and_says_of_few_degrees_of_freedom() -> N
     )
 
 
-def test_options_without_readings_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["run", "--budget", str(TOP / "designs/quickstart.yaml"), "--sigma", "given"]) == 2
-    assert wording.SIGMA_GOES_WITH_READINGS in capsys.readouterr().err
-
-
 def test_a_certificate_counts_whatever_is_said_of_the_table(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -42,17 +42,15 @@ from tests.extensions.judgement.model_campaigns import (
     uncertainties,
 )
 from tests.reference import dense
+from tests.reference.small_quickstart import small_quickstart
 
 Real = NDArray[np.float64]
 
 
 def small(**changed: object) -> Experiment:
     """Nine balls in six positions."""
-    plate = {"plate": {"kind": "grid", "balls": [3, 3], "size": ["750 mm", "750 mm"]}}
-    model = {"kind": "kinematic", "position_coefficients": 3, "rotation_coefficients": 2}
     points = {"points": {"random": 20, "seed": 3}, "probe": "down"}
-    changes = {"artefacts": plate, "error_model": model, "evaluation": points, **changed}
-    return bp.quickstart().with_(changes)
+    return small_quickstart(**{"evaluation": points, **changed})
 
 
 def simulated(experiment: Experiment, seed: int = 1) -> ObservedReadings:
@@ -260,28 +258,14 @@ def test_two_dimensions() -> None:
 
 def flat(**changed: object) -> Experiment:
     """A plate in one position, in which most errors cannot be told from its pose."""
-    position = {
-        "name": "z",
-        "plane": "z",
-        "level": "500 mm",
-        "corner": {"x": "100 mm", "y": "90 mm"},
-    }
-    return bp.experiment(
-        {
-            "title": "one position",
-            "machine": {"volume": ["1 m", "1 m", "1 m"], "repeatability": "0.5 um"},
-            "error_model": {"kind": "kinematic", "position_coefficients": 3, "rotation_coefficients": 2},
-            "probes": {"down": ["0 mm", "0 mm", "-100 mm"]},
-            "artefacts": {"plate": {"kind": "grid", "balls": [5, 5], "size": ["750 mm", "750 mm"]}},
-            "positions": [position],
-            "calibration": [
-                {"kind": "coordinates", "artefact": "plate", "balls": "all",
-                 "standard_uncertainty": {"x": "0.3 um", "y": "0.3 um", "z": "0.3 um"}}
-            ],
-            "evaluation": {"points": {"random": 10, "seed": 1}},
-        }
-        | changed
-    )  # fmt: skip
+    known = {"x": "0.3 um", "y": "0.3 um", "z": "0.3 um"}
+    corner = {"x": "100 mm", "y": "90 mm"}
+    one = {"name": "z", "plane": "z", "level": "500 mm", "corner": corner, "probes": ["down"]}
+    given = {"kind": "coordinates", "balls": "all", "standard_uncertainty": known}
+    plate = {"kind": "grid", "balls": [5, 5], "size": ["750 mm", "750 mm"]}
+    sections = {"artefacts": {"plate": plate}, "positions": [one], "calibration": [given]}
+    exact = {"probes": {"down": ["0 mm", "0 mm", "-100 mm"]}, "true_machine": {"kind": "zero"}}
+    return small(**{**sections, **exact, "machine.repeatability": "0.5 um", **changed})
 
 
 def test_the_richest_model_of_one_position_is_recommended_with_a_warning() -> None:

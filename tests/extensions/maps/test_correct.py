@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import ballplate as bp
@@ -160,14 +159,6 @@ def test_what_is_undetermined_is_told(folder: Path, capsys: pytest.CaptureFixtur
     assert "nan" not in told
 
 
-def test_the_headline_of_what_is_undetermined_states_no_uncertainty(fitted: FittedMap) -> None:
-    nothing = replace(fitted, undetermined=np.diag(fitted.scale))
-    assert bp.correct(nothing, [[0.1, 0.2, 0.3]]).headline() == "1 point, undetermined"
-    told = bp.correct(nothing, [[0.1, 0.2, 0.3], [0.4, 0.2, 0.3]]).lines()
-    assert told[0].endswith(": 2 points, undetermined") and "µm at most" not in "".join(told)
-    assert bp.correct(fitted, [[0.1, 0.2, 0.3]]).headline().startswith("1 point; U = 2 u = 0.")
-
-
 def test_the_command_writes_what_python_gives(
     fitted: FittedMap, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -230,10 +221,8 @@ POINTS = "name,x_mm,y_mm,z_mm\nA,100,200,300\nB,400,200,300\nA,1,2,3\n"
 SLIPS = {
     "unknown name": (POINTS, ["--length", "B", "C"], 2, 'no point is called "C"'),
     "name twice": (POINTS, ["--length", "B", "A"], 2, '2 points are called "A"'),
-    "unknown probe": (POINTS, ["--probe", "up"], 2, 'no probe "up" in the map'),
     "unit": (POINTS.replace("_mm", "_m"), [], 3, ":2:1: x is 100 m, far outside the volume"),
     "no number": (POINTS.replace("400", "4OO"), [], 3, ':3:3: "4OO" is not a number'),
-    "no axis": ("x_mm,y_mm\n1,2\n", [], 3, "no column for z"),
     "same place": (POINTS + "D,1,2,3\nE,1,2,3\n", ["--length", "D", "E"], 2, "coincide"),
 }
 
@@ -248,14 +237,6 @@ def test_slips_are_told(
     arguments = ["correct", str(tmp_path / "map.yaml"), str(tmp_path / "points.csv"), *options]
     assert main(arguments) == status
     assert told in capsys.readouterr().err
-
-
-def test_few_degrees_of_freedom_are_told(folder: Path) -> None:
-    fitted = replace(
-        fit_of("metric", folder).to_map(), degrees_of_freedom=5, sigma_is_estimated=True
-    )
-    found = bp.correct(fitted, [[0.1, 0.1]])
-    assert any(wording.DEGREES_OF_FREEDOM_IS_ITSELF_UNCERTAIN in one for one in found.warnings)
 
 
 def test_fits_and_files_that_name_readings_are_taken_as_their_maps_are(

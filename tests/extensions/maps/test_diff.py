@@ -15,13 +15,14 @@ from ballplate.cli import main
 from ballplate.results.fits import Fit
 
 from tests.extensions.maps import wording
+from tests.reference.small_quickstart import small_quickstart
 
 PARK = Path("designs/park")
 
 
 @pytest.fixture(scope="module")
 def fits() -> list[Fit]:
-    return [bp.fit(bp.quickstart(), bp.simulate(bp.quickstart(), seed)) for seed in (1, 2)]
+    return [bp.fit(small_quickstart(), bp.simulate(small_quickstart(), seed)) for seed in (1, 2)]
 
 
 @pytest.fixture
@@ -59,26 +60,26 @@ def test_the_same_readings_twice_are_no_agreement(
     tmp_path: Path, maps: list[str], fits: list[Fit], capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Whatever the table is called, in whatever order it stands, and for another error model."""
-    table = bp.simulate(bp.quickstart(), 1)
+    table = bp.simulate(small_quickstart(), 1)
     table.sample(frac=1.0, random_state=2).to_csv(tmp_path / "again.csv", index=False)
-    again = bp.fit(bp.quickstart(), tmp_path / "again.csv")
+    again = bp.fit(small_quickstart(), tmp_path / "again.csv")
     bp.write_map(again.to_map(), tmp_path / "again.yaml")  # type: ignore[attr-defined]
     assert main(["diff", maps[0], str(tmp_path / "again.yaml"), "--grid", "2", "--fail"]) == 1
     said = capsys.readouterr()
     assert wording.REST_ON_THE_SAME_READINGS in said.err and "change is shown" not in said.out
-    poorer = bp.quickstart().with_({"error_model.position_coefficients": 4})
+    poorer = small_quickstart().with_({"error_model.position_coefficients": 2})
     for second in (again, bp.fit(poorer, table)):
         found = bp.diff(fits[0], second, grid=2)  # type: ignore[arg-type]
         assert found.is_changed is None and "same readings" in found.headline()
         assert found.to_dict()["same_readings"] is True
-    mixed = bp.simulate(bp.quickstart(), 2)
-    assert bp.diff(fits[0], bp.fit(bp.quickstart(), mixed), grid=2).is_changed is False  # type: ignore[arg-type]
+    mixed = bp.simulate(small_quickstart(), 2)
+    assert bp.diff(fits[0], bp.fit(small_quickstart(), mixed), grid=2).is_changed is False  # type: ignore[arg-type]
     mixed.loc[mixed["position"] == "x low"] = table.loc[table["position"] == "x low"]
-    found = bp.diff(fits[0], bp.fit(bp.quickstart(), mixed), grid=2)  # type: ignore[arg-type]
+    found = bp.diff(fits[0], bp.fit(small_quickstart(), mixed), grid=2)  # type: ignore[arg-type]
     assert found.is_changed is None and wording.THE_SAME_IN_BOTH_CAMPAIGNS in found.notes[-1]
     # One reading fewer in each position, and the others rounded to a tenth of a micrometre.
     edited = table.groupby("position", sort=False).tail(-1).round(4)
-    evaluated: Any = bp.fit(bp.quickstart(), edited)
+    evaluated: Any = bp.fit(small_quickstart(), edited)
     # These are other readings, but too much alike.
     for second in (evaluated, evaluated.to_map()):
         assert wording.AS_ALIKE_AS_THESE in bp.diff(maps[0], second, grid=2).notes[-1]
@@ -102,8 +103,8 @@ def printed(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:
 def test_a_change_fails_where_that_is_asked(
     tmp_path: Path, maps: list[str], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    other = bp.quickstart().with_({"true_machine.seed": 8})
-    bp.write_map(bp.fit(bp.quickstart(), bp.simulate(other, 3)).to_map(), tmp_path / "c.yaml")  # type: ignore[attr-defined]
+    other = small_quickstart().with_({"true_machine.seed": 8})
+    bp.write_map(bp.fit(small_quickstart(), bp.simulate(other, 3)).to_map(), tmp_path / "c.yaml")  # type: ignore[attr-defined]
     assert main(["diff", *maps, "--fail", "--grid", "2"]) == 0
     capsys.readouterr()
     assert main(["diff", maps[0], str(tmp_path / "c.yaml"), "--fail", "--grid", "2", "--json"]) == 1

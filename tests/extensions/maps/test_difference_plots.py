@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, replace
 
-import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.extensions.maps.comparison import MapComparison, compared
@@ -13,13 +12,14 @@ from ballplate.extensions.maps.difference_plots import draw_difference
 from ballplate.simulator.machines.protocol import Array
 
 from tests.extensions.maps.campaigns import simulated_map
+from tests.reference.small_quickstart import small_quickstart
 
 pytest.importorskip("matplotlib", reason="pictures need matplotlib")
 
 
 @pytest.fixture(scope="module")
 def found() -> MapComparison:
-    maps = [simulated_map(bp.quickstart(), seed) for seed in (1, 2)]
+    maps = [simulated_map(small_quickstart(), seed) for seed in (1, 2)]
     return compared(maps[0], maps[1], grid=3)
 
 

@@ -8,7 +8,7 @@ from itertools import combinations
 import ballplate as bp
 import numpy as np
 import pytest
-from ballplate.extensions.maps.compared_maps import ComparedMap, map_of_fit, motions
+from ballplate.extensions.maps.compared_maps import ComparedMap, map_of_fit
 from ballplate.extensions.maps.comparison import compared
 from ballplate.results.fits import Fit
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
@@ -117,17 +117,6 @@ def test_a_map_moved_as_a_whole_differs_by_that_motion(fits: tuple[Fit, Fit]) ->
     assert found.motion.values[3:] == pytest.approx(motion[3:], abs=1e-12)
     shift = motion[:3] + np.cross(motion[3:], [0.5, 0.5, 0.5])
     assert found.motion.values[:3] == pytest.approx(shift, abs=1e-12)
-
-
-def test_motions_are_derivatives_of_rigid_motions() -> None:
-    points = np.random.default_rng(0).uniform(-1.0, 1.0, (5, 3))
-    found = motions(points)
-    for axis in range(3):
-        turn = np.eye(3)[axis]
-        assert found[:, :, 3 + axis] == pytest.approx(np.cross(turn, points))
-        assert found[:, :, axis] == pytest.approx(np.tile(turn, (5, 1)))
-    plane = motions(points[:, :2])
-    assert plane[:, :, 2] == pytest.approx(np.stack([-points[:, 1], points[:, 0]], axis=1))
 
 
 def dense_lengths(fit: Fit, points: Array, pairs: Array) -> tuple[Array, Array]:

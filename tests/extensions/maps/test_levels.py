@@ -32,40 +32,18 @@ LEVEL = 0.05
 
 
 def small(repeatability: str = "0.2 um") -> Experiment:
-    """A plate of four balls, of which all six distances are certified, in nine positions."""
-    return bp.experiment(
+    """A plate of four balls, of which all six distances are certified, in six positions."""
+    given = {"kind": "distances", "pairs": "all", "standard_uncertainty": "0.2 um"}
+    return bp.quickstart().with_(
         {
-            "title": "four balls",
-            "machine": {"volume": ["1 m", "1 m", "1 m"], "repeatability": repeatability},
-            "error_model": {
-                "kind": "kinematic",
-                "arrangement": "MB2",
-                "position_coefficients": 2,
-                "rotation_coefficients": 1,
-            },
-            "probes": {
-                "down": ["0 mm", "0 mm", "-50 mm"],
-                "right": ["50 mm", "0 mm", "0 mm"],
-                "back": ["0 mm", "50 mm", "0 mm"],
-            },
-            "artefacts": {"plate": {"kind": "grid", "balls": [2, 2], "size": ["0.5 m", "0.5 m"]}},
-            "positions": [
-                {
-                    "name": f"{plane}{k}",
-                    "plane": plane,
-                    "level": f"{200 + 500 * (k % 2)} mm",
-                    "corner": {
-                        axis: f"{100 + 200 * (k // 2)} mm" for axis in "xyz".replace(plane, "")
-                    },
-                    "quarter_turns": k,
-                    "probes": [probe],
-                }
-                for plane, probe in (("x", "right"), ("y", "back"), ("z", "down"))
-                for k in range(3)
-            ],
-            "calibration": [
-                {"kind": "distances", "pairs": "all", "standard_uncertainty": "0.2 um"}
-            ],
+            "machine.repeatability": repeatability,
+            "error_model.position_coefficients": 2,
+            "error_model.rotation_coefficients": 1,
+            "artefacts.plate": {"kind": "grid", "balls": [2, 2], "size": ["0.5 m", "0.5 m"]},
+            "calibration": [given],
+            # One tip in each plane, so that the machine's scale rests on the certificate.
+            **{f"positions[x {one}].probes": ["right"] for one in ("low", "high")},
+            **{f"positions[y {one}].probes": ["back"] for one in ("low", "high")},
         }
     )
 

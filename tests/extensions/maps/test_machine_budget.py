@@ -1,6 +1,5 @@
 """Error curves and budgets of machine files, against machines that have one error alone and draws."""
 
-import json
 import re
 from pathlib import Path
 from typing import Any
@@ -127,20 +126,3 @@ def test_curves_are_those_of_the_file_at_the_reference_point(tmp_path: Path) -> 
     assert [one.name for one in bp.curves(written(tmp_path), "EBX").functions.curves] == ["EBX"]
     with pytest.raises(ValueError, match='the machine has no error "EZY"'):
         bp.curves(written(tmp_path), "EZY")
-
-
-def test_curves_of_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = str(written(tmp_path))
-    assert main(["map", path, "--curves"]) == 0
-    out = capsys.readouterr().out
-    assert "U: one standard deviation (k = 1) of the random parts" in out
-    assert (
-        main(["map", path, "--curves", "--error", "EXX", "--points", "3", "--format", "csv"]) == 0
-    )
-    lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == "error,line,position_mm,value,U,k,unit"
-    assert lines[2].split(",")[:5] == ["EXX", "", "450", "3.5", "2"]
-    assert main(["map", path, "--curves", "--json"]) == 0
-    (data,) = [json.loads(capsys.readouterr().out)]
-    assert data["title"] == "moving bridge" and data["coverage_factor"] == 1.0
-    assert data["functions"][0]["expanded_uncertainty"] == pytest.approx([2e-6] * 41)

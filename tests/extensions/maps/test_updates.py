@@ -11,6 +11,7 @@ from ballplate.simulator.experiment.model import Experiment
 from scipy.stats import chi2
 
 from tests.extensions.maps import wording
+from tests.reference.small_quickstart import small_quickstart
 
 
 def estimated(experiment: Experiment, seed: int) -> Any:
@@ -19,14 +20,14 @@ def estimated(experiment: Experiment, seed: int) -> Any:
 
 def updated(path: Path, changed: dict[str, Any], seed: int) -> Any:
     """The fit of another campaign, on what may be another machine, that knows the map of a file."""
-    readings = bp.simulate(bp.quickstart().with_(changed), seed)
-    known = bp.quickstart().with_({"priors": [{"kind": "map", "file": str(path)}]})
+    readings = bp.simulate(small_quickstart().with_(changed), seed)
+    known = small_quickstart().with_({"priors": [{"kind": "map", "file": str(path)}]})
     return bp.fit(known, readings)
 
 
 def written(folder: Path, seed: int) -> Path:
     path = folder / f"{seed}.yaml"
-    bp.write_map(estimated(bp.quickstart(), seed).to_map(), path)
+    bp.write_map(estimated(small_quickstart(), seed).to_map(), path)
     return path
 
 
@@ -57,6 +58,6 @@ def test_an_update_that_differs_shows_a_change(tmp_path: Path) -> None:
         assert wording.BOTH_REST_ON_SOME in str(found)
         assert not found.to_dict()["same_readings"]
     # So do the new readings alone, of which there is no doubt.
-    other = bp.quickstart().with_({"true_machine.seed": 8})
-    alone: Any = bp.fit(bp.quickstart(), bp.simulate(other, 3))
+    other = small_quickstart().with_({"true_machine.seed": 8})
+    alone: Any = bp.fit(small_quickstart(), bp.simulate(other, 3))
     assert bp.diff(first, alone, grid=2).is_changed is True

@@ -50,14 +50,6 @@ def write(
     return str(path)
 
 
-def test_balls_may_be_outside_where_the_scales_are_inside(tmp_path: Path) -> None:
-    """193 mm below the volume, on a probe of 400 mm."""
-    path = write(tmp_path, level="-193 mm")
-    assert main(["simulate", path, "--exact", "-o", str(tmp_path / "r.csv")]) == 0
-    z = [float(line.split(",")[-1]) for line in (tmp_path / "r.csv").read_text().splitlines()[1:]]
-    assert z == pytest.approx([207.0] * 9)
-
-
 def test_scale_readings_outside_are_refused_though_the_balls_are_inside(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -75,7 +67,7 @@ def test_a_file_is_accepted_just_where_all_scale_readings_are_inside(tmp_path: P
     """Readings as the design has them, in random places with random probes."""
     generator = np.random.default_rng(5)
     accepted = 0
-    for _ in range(120):
+    for _ in range(40):
         offset, at = (
             generator.uniform(-0.3, 0.3, 3).round(3),
             generator.uniform(-0.3, 0.9, 3).round(3),
@@ -101,7 +93,7 @@ def test_a_file_is_accepted_just_where_all_scale_readings_are_inside(tmp_path: P
             with pytest.raises(ExperimentError, match=wording.PUTS_THE_SCALES):
                 load(path)
         accepted += expected
-    assert 5 < accepted < 115
+    assert 1 < accepted < 39
 
 
 def test_readings_outside_are_told_by_fit(

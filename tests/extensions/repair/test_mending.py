@@ -141,59 +141,28 @@ def test_a_variant_of_its_own_positions_is_changed_there() -> None:
     assert sum(turn > 0 for turn in turned) == 1
 
 
-SHARED = """\
+def test_what_is_set_within_the_change_already_is_refused() -> None:
+    text = """\
 title: shared
 machine: {volume: [900 mm, 900 mm], repeatability: 0.2 um}
 error_model: {kind: metric, scale: x}
 artefacts: {plate: {kind: square, balls: 4, size: 360 mm}}
 positions:
-"""
-
-
-@pytest.mark.parametrize(
-    "positions, variant, place, words",
-    [
-        (
-            """\
-  - &first {name: a, corner: {x: 250 mm, y: 250 mm}}
-  - {name: c, corner: {x: 300 mm, y: 300 mm}}
-variants:
-  base: {}
-  own:
-    positions: [*first, {name: d, corner: {x: 300 mm, y: 350 mm}}]
-""",
-            "own",
-            "11:17: variants.own.positions[0].quarter_turns",
-            "is an alias; change the value at its anchor",
-        ),
-        (
-            """\
   - {name: a, corner: {x: 250 mm, y: 250 mm}}
   - {name: c, corner: {x: 300 mm, y: 300 mm}}
 variants:
   own: {"positions[a].corner.x": 200 mm, seed: 2}
-""",
-            "own",
-            "9:9: variants.own",
-            "the repair changes positions[0].corner, which includes this",
-        ),
-    ],
-)
-def test_what_others_share_is_refused(
-    positions: str, variant: str | None, place: str, words: str
-) -> None:
+pool: {}
+"""
     # Where a pool is, no other positions are added, and one that is there is turned.
-    text = f"{SHARED}{positions}pool: {{}}\n"
-    repair = first_repair(text, variant)
-    if "corner, which" in words:
-        # As where the position is moved, too.
-        (edit,) = repair.edits
-        moved = {**edit.value, "corner": {"x": "210 mm", "y": "260 mm"}}
-        repair = replace(repair, edits=(replace(edit, value=moved),))
-    with pytest.raises(ExperimentError) as caught:
-        mended(text, SOURCE, variant, repair)
-    assert str(caught.value).startswith(f"{SOURCE}:{place}: ")
-    assert words in str(caught.value)
+    repair = first_repair(text, "own")
+    # As where the position is moved, too.
+    (edit,) = repair.edits
+    moved = {**edit.value, "corner": {"x": "210 mm", "y": "260 mm"}}
+    repair = replace(repair, edits=(replace(edit, value=moved),))
+    with pytest.raises(ExperimentError, match=wording.INCLUDES_THIS) as caught:
+        mended(text, SOURCE, "own", repair)
+    assert str(caught.value).startswith(f"{SOURCE}:9:9: variants.own: ")
 
 
 def test_a_text_that_does_not_say_what_was_found_is_refused() -> None:

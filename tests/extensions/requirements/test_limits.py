@@ -63,11 +63,6 @@ def test_temperatures_are_named_where_they_limit() -> None:
     assert average(warm(f"{found.value + 1e-4:.4f} K")) > limit
 
 
-def test_nothing_is_named_where_the_goal_is_met() -> None:
-    _, limited = answered(warm(), 1.0, "repeatability")
-    assert limited == ""
-
-
 def test_tips_are_as_uncertain_as_the_goal_permits() -> None:
     def with_tips(u: float) -> bp.Experiment:
         experiment = small_quickstart(**FEW)
@@ -115,7 +110,7 @@ def test_one_more_coefficient_with_the_fewest_balls() -> None:
     assert told.endswith("undetermined") if math.isnan(ratio) else f"{ratio:.2g} times" in told
 
 
-@pytest.mark.parametrize("place", range(60, 700, 37))
+@pytest.mark.parametrize("place", range(60, 700, 160))
 def test_a_narrow_range_of_sizes_is_found(place: int) -> None:
     """Of two better sizes the one that does is narrow, the other wide: steps of a stub."""
     experiment = small_quickstart(**FEW)
@@ -154,7 +149,8 @@ def test_the_hours_are_those_of_the_shortest_plan(tmp_path: Path) -> None:
     path = tmp_path / "pool.yaml"
     drawn = "{name: p, plane: z, level: 50 mm, corner: {x: 0 mm, y: 0 mm}, probes: [down]}"
     drawn = drawn.replace("name: p", "name: p, artefact: plate")
-    path.write_text(f"{TEXT}\npositions:\n  - {drawn}\n", encoding="utf-8")
+    few = TEXT.replace("[0 mm, 300 mm]", "0 mm").replace("[0 mm, 200 mm]", "0 mm")
+    path.write_text(f"{few}\npositions:\n  - {drawn}\n", encoding="utf-8")
     (experiment,) = load(path, planning=True)
     best = bp.plan(experiment, hours=3.0).prediction.quantities["U6"].average
     goal = parse_goal(f"U6 average {1.0000001e6 * best:.12g} um")
@@ -165,14 +161,6 @@ def test_the_hours_are_those_of_the_shortest_plan(tmp_path: Path) -> None:
     assert judge(goal, bp.plan(experiment, hours=hours).prediction).is_met
     less = bp.plan(experiment, hours=hours - 0.25)
     assert not judge(goal, less.prediction).is_met
-
-
-def test_a_pool_alone_is_no_design(tmp_path: Path) -> None:
-    path = tmp_path / "pool.yaml"
-    path.write_text(TEXT, encoding="utf-8")
-    (experiment,) = load(path, planning=True)
-    with pytest.raises(bp.ExperimentError, match="positions: missing"):
-        reach(experiment, parse_goal("U6 average 1 um"), ("hours",))
 
 
 def test_a_certificate_is_varied_with_what_its_values_have_in_common() -> None:

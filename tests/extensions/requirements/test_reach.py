@@ -86,7 +86,7 @@ def test_without_certificate_uncertainties_are_proportional_to_the_repeatability
     assert found.words == f"{1e6 * found.value:.9g} um"
 
 
-@pytest.mark.parametrize("limit", [0.05e-6, 0.021e-6])
+@pytest.mark.parametrize("limit", [0.05e-6])
 def test_without_certificate_uncertainties_fall_with_the_root_of_the_repeats(
     tmp_path: Path, limit: float
 ) -> None:
@@ -96,6 +96,7 @@ def test_without_certificate_uncertainties_fall_with_the_root_of_the_repeats(
     assert found.beside.startswith(f"{found.value - 1:g} is not enough: average U6 ")
 
 
+@pytest.mark.long
 def test_more_repeats_than_a_file_may_have_are_told(tmp_path: Path) -> None:
     """Two million readings are the most; 64 balls are read with each probe of a position."""
     (experiment,) = load(written(tmp_path, TEXT, ("balls: [4, 4]", "balls: [8, 8]")))
@@ -146,7 +147,10 @@ def test_the_size_is_the_smallest_that_does(tmp_path: Path) -> None:
     assert found.remarks[0].startswith(wording.FROM_MM_MM)
 
 
-@pytest.mark.parametrize("drawn", [(4, 4), (4, 3), (3, 5)])
+@pytest.mark.parametrize(
+    "drawn",
+    [(4, 3), *(pytest.param(one, marks=pytest.mark.long) for one in ((4, 4), (3, 5)))],
+)
 def test_balls_are_the_fewest_of_all_grids_nearly_in_proportion(
     tmp_path: Path, drawn: tuple[int, int]
 ) -> None:
@@ -244,8 +248,6 @@ def test_shares_and_tasks(tmp_path: Path) -> None:
     [
         ("U7 average 1 um", '"U7" is not a quantity with a limit; known: U1'),
         ("U2 average 1 um", '"U2" is not a quantity with a limit; give U2 lengths or U2 angles'),
-        ("U6 median 1 um", '"U6 median 1 um" is not a goal; write lengths, tasks'),
-        ("U6 average 1", '"1" has no unit'),
         ("U2 angles maximum 1 um", '"1 um" is a length; an angle is expected'),
     ],
 )
@@ -276,7 +278,6 @@ def test_options_that_do_not_fit_are_refused(
     file = str(written(tmp_path, TEXT))
     for wrong in (
         ["--goal", "U9"],
-        ["--target", "3"],
         ["--share", "95%", "--goal", "tasks"],
         ["--calibration", "1"],
     ):
