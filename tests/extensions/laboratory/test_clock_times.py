@@ -66,16 +66,6 @@ def test_clock_times_are_those_in_seconds(
     np.testing.assert_allclose(times(experiment, other), times(experiment, table), atol=1e-6)
 
 
-def test_a_fit_with_clock_times_is_that_with_seconds(
-    experiment: bp.Experiment, table: pd.DataFrame
-) -> None:
-    clock = [(START + timedelta(seconds=int(s))).isoformat() for s in table["time_s"]]
-    other = table.drop(columns="time_s").assign(time=clock)
-    found, expected = bp.fit(experiment, other), bp.fit(experiment, table)
-    one, two = (each.to_frame()["value"].to_numpy(float) for each in (found, expected))
-    np.testing.assert_allclose(one, two, rtol=1e-7, atol=1e-15)
-
-
 def test_dates_count_over_midnight_and_in_any_order(
     experiment: bp.Experiment, table: pd.DataFrame
 ) -> None:
@@ -116,12 +106,6 @@ def test_what_does_not_tell_the_day_is_refused(
         bp.fit(experiment, bare.assign(time=[*clock[:after], *[""] * (len(bare) - after)]))
     with pytest.raises(ExperimentError, match=wording.IS_NO_TIME_OF_A_CLOCK):
         times(experiment, bare.assign(time=12.5))
-
-
-def test_without_a_drift_times_are_not_used(table: pd.DataFrame) -> None:
-    plain = table.drop(columns="time_s").assign(time="10:05")
-    found = bp.fit(bp.quickstart(), plain)
-    assert any('not used: "time"' in remark for remark in found.remarks)
 
 
 @pytest.mark.parametrize(

@@ -11,22 +11,10 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tests.extensions.laboratory import wording
+from tests.extensions.laboratory.test_ball_centres import AXES, centres
 
-AXES = ["x_mm", "y_mm", "z_mm"]
-OFFSETS = {"down": (0, 0, -50), "right": (50, 0, 0), "left": (-50, 0, 0), "back": (0, 50, 0)}
-OFFSETS |= {"front": (0, -50, 0)}
 PITCH = 187.5
 Turn = NDArray[np.float64]
-
-
-@pytest.fixture(scope="module")
-def experiment() -> bp.Experiment:
-    return bp.quickstart()
-
-
-@pytest.fixture(scope="module")
-def readings(experiment: bp.Experiment) -> pd.DataFrame:
-    return bp.simulate(experiment)
 
 
 def by_rows(ball: str) -> int:
@@ -39,21 +27,15 @@ def by_columns(ball: str) -> int:
 
 def in_part(readings: pd.DataFrame, turn: Turn) -> pd.DataFrame:
     """Centres in axes along the plate's rows and columns, as alignments make them, then turned."""
-    found = readings.copy()
-    offset = np.array([OFFSETS[probe] for probe in found["probe"]])
-    centres = found[AXES].to_numpy() + offset
+    found = centres(readings)
     for position in found["position"].unique():
-        own = np.flatnonzero(found["position"] == position)
-        drawn = np.array(
-            [
-                [PITCH * (int(b[3]) - 1), PITCH * (int(b[1]) - 1), 0.0]
-                for b in found["ball"].iloc[own]
-            ]
-        )
-        seen = centres[own]
+        own = found["position"] == position
+        balls = found.loc[own, "ball"]
+        drawn = np.array([[PITCH * (int(b[3]) - 1), PITCH * (int(b[1]) - 1), 0.0] for b in balls])
+        seen = found.loc[own, AXES].to_numpy()
         rotation, _ = Rotation.align_vectors(drawn - drawn.mean(0), seen - seen.mean(0))
-        centres[own] = rotation.apply(seen - seen.mean(0)) @ turn.T
-    return found.assign(**dict(zip(AXES, centres.T, strict=True)))
+        found.loc[own, AXES] = rotation.apply(seen - seen.mean(0)) @ turn.T
+    return found
 
 
 ASKEW = Rotation.from_euler("xyz", [0.4, 0.9, -1.1]).as_matrix()
@@ -72,20 +54,13 @@ def test_numbers_that_agree_with_places_in_the_part_are_taken(
     np.testing.assert_allclose(*values, atol=1e-12)
 
 
-def test_numbers_that_contradict_places_in_the_part_are_refused(
-    experiment: bp.Experiment, readings: pd.DataFrame
+@pytest.mark.parametrize(
+    ("turn", "number"), [(np.eye(3), by_columns), (ASKEW, by_rows), (ASKEW, by_columns)]
+)
+def test_numbers_that_places_contradict_or_nothing_tells_are_refused(
+    turn: Turn, number: object, experiment: bp.Experiment, readings: pd.DataFrame
 ) -> None:
-    numbered = in_part(readings, np.eye(3))
-    numbered["ball"] = numbered["ball"].map(by_columns)
-    with pytest.raises(ExperimentError, match=wording.NOR_NUMBERS_THAT_FIT):
-        bp.fit(experiment, numbered, coordinates="part")
-
-
-@pytest.mark.parametrize("number", [by_rows, by_columns])
-def test_numbers_that_nothing_tells_are_refused(
-    number: object, experiment: bp.Experiment, readings: pd.DataFrame
-) -> None:
-    numbered = in_part(readings, ASKEW)
+    numbered = in_part(readings, turn)
     numbered["ball"] = numbered["ball"].map(number)
     with pytest.raises(ExperimentError, match=wording.NOR_NUMBERS_THAT_FIT):
         bp.fit(experiment, numbered, coordinates="part")

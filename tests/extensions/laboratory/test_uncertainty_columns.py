@@ -4,58 +4,44 @@ question.
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import ballplate as bp
+import numpy as np
 import pandas as pd
 import pytest
 from ballplate.extensions.laboratory.reading_tables import any_table_rows
+from ballplate.simulator.design.arrays import reading_uncertainties
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.loading import load
-from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.yamltree import GivenText
+from ballplate.simulator.readings.reading_files import read_readings
 from ballplate.simulator.readings.reading_sources import source_text
 
 from tests.extensions.laboratory import wording
 
-DESIGN = Path("designs/quickstart.yaml")
-
-
-@pytest.fixture(scope="module")
-def experiment() -> Experiment:
-    (found,) = load(DESIGN)
-    return found
+EXPERIMENT = bp.quickstart()
+DESIGN = lay_out(EXPERIMENT)
 
 
 def uncertainties(
-    experiment: Experiment, heads: str, cells: str, separator: str = ",", **said: object
+    heads: str, cells: str, separator: str = ",", **said: object
 ) -> tuple[list[float], str]:
     """Uncertainties in metres of a table of two readings, and how it was told to be read."""
-    design = lay_out(experiment)
     names = {
-        "position": design.positions.names,
-        "ball": design.balls.names,
-        "probe": design.probes.names,
+        "position": DESIGN.positions.names,
+        "ball": DESIGN.balls.names,
+        "probe": DESIGN.probes.names,
     }
     lines = [f"position,ball,probe,x_mm,y_mm,z_mm,{heads}"]
     lines += [f"z low,r1c{k},down,{100 * k}.1,200.25,250.125,{cells}" for k in (1, 2)]
     text = "\n".join(lines).replace(",", separator) + "\n"
-    settings = experiment.with_readings(said).readings
-    found = any_table_rows(
-        source_text(GivenText("t.csv", text)),
-        names,
-        settings,
-        [],
-        3,
-        {},
-    )
+    settings = EXPERIMENT.with_readings(said).readings
+    found = any_table_rows(source_text(GivenText("t.csv", text)), names, settings, [], 3, {})
     return [row.lengths[3] for row in found.rows], " ".join(found.told)
 
 
 @pytest.mark.parametrize("head", ["u_um", "u [um]", "standard_uncertainty_um", "u (µm)"])
-def test_standard_uncertainties_are_taken_as_they_stand(experiment: Experiment, head: str) -> None:
-    found, _ = uncertainties(experiment, head, "0.4")
+def test_standard_uncertainties_are_taken_as_they_stand(head: str) -> None:
+    found, _ = uncertainties(head, "0.4")
     assert found == pytest.approx([0.4e-6, 0.4e-6])
 
 
@@ -73,10 +59,10 @@ def test_standard_uncertainties_are_taken_as_they_stand(experiment: Experiment, 
     ],
 )
 def test_expanded_uncertainties_are_divided_by_their_coverage_factors(
-    experiment: Experiment, heads: str, cells: str, expected: float
+    heads: str, cells: str, expected: float
 ) -> None:
     for separator in (",", ";", "\t"):
-        found, told = uncertainties(experiment, heads, cells, separator)
+        found, told = uncertainties(heads, cells, separator)
         assert found == pytest.approx([expected, expected], rel=1e-12)
         assert (wording.DIVIDED_BY_ITS_COVERAGE_FACTOR in told) == ("standard" not in heads)
 
@@ -86,16 +72,14 @@ def test_expanded_uncertainties_are_divided_by_their_coverage_factors(
     ["U_um", "U [um]", "uncertainty_um", "Unsicherheit [um]", "U95_um", "u95_um", "U (95 %) [um]"]
     + ["u (k=2) [um]", "standard uncertainty (k=2) [um]"],
 )
-def test_what_does_not_say_which_uncertainty_it_is_is_refused(
-    experiment: Experiment, head: str
-) -> None:
+def test_what_does_not_say_which_uncertainty_it_is_is_refused(head: str) -> None:
     with pytest.raises(ExperimentError, match=wording.DOES_NOT_SAY_WHICH_UNCERTAINTY) as refused:
-        uncertainties(experiment, head, "0.9")
+        uncertainties(head, "0.9")
     assert "standard_uncertainty_um" in str(refused.value)
     if "k=" in head:
         return
     # Who names the column says that it is the standard uncertainty.
-    found, _ = uncertainties(experiment, head, "0.9", columns={"u": head})
+    found, _ = uncertainties(head, "0.9", columns={"u": head})
     assert found == pytest.approx([0.9e-6, 0.9e-6])
 
 
@@ -110,32 +94,34 @@ def test_what_does_not_say_which_uncertainty_it_is_is_refused(
         ("u_um,standard_uncertainty_um", "0.9,0.8", "could all be u"),
     ],
 )
-def test_coverage_factors_that_are_missing_or_wrong(
-    experiment: Experiment, heads: str, cells: str, text: str
-) -> None:
+def test_coverage_factors_that_are_missing_or_wrong(heads: str, cells: str, text: str) -> None:
     with pytest.raises(ExperimentError, match="t.csv:[12]:1: ") as refused:
-        uncertainties(experiment, heads, cells)
+        uncertainties(heads, cells)
     assert text in str(refused.value)
 
 
-def test_a_standard_uncertainty_goes_before_an_expanded_one(experiment: Experiment) -> None:
-    found, told = uncertainties(experiment, "u_um,U (k=2) [um]", "0.4,0.9")
+def test_a_standard_uncertainty_goes_before_an_expanded_one() -> None:
+    found, told = uncertainties("u_um,U (k=2) [um]", "0.4,0.9")
     assert found == pytest.approx([0.4e-6, 0.4e-6])
     assert 'not used: "U (k=2) [um]"' in told
 
 
-def test_an_expanded_uncertainty_named_as_a_standard_one(experiment: Experiment) -> None:
+def test_an_expanded_uncertainty_named_as_a_standard_one() -> None:
     with pytest.raises(ExperimentError, match="names standard uncertainties"):
-        uncertainties(experiment, "U (k=2) [um]", "0.9", columns={"u": "U (k=2) [um]"})
+        uncertainties("U (k=2) [um]", "0.9", columns={"u": "U (k=2) [um]"})
 
 
-def test_an_uncertainty_of_all_rows_is_that_of_a_column() -> None:
-    experiment, readings = bp.quickstart(), bp.simulate(bp.quickstart())
-    found = bp.fit(experiment, readings, columns={"u": "=0.35 um"})
-    expected = bp.fit(experiment, readings.assign(u_um=0.35))
-    for column in ("value", "standard uncertainty"):
-        pd.testing.assert_series_equal(found.to_frame()[column], expected.to_frame()[column])
-    assert any(wording.IS_UM_IN_ALL_ROWS in one for one in found.remarks)
+def test_an_uncertainty_of_all_rows_is_that_of_a_column(readings: pd.DataFrame) -> None:
+    stated = EXPERIMENT.with_readings({"columns": {"u": "=0.35 um"}}).readings
+    plain, column = (
+        read_readings(GivenText("t.csv", table.to_csv(index=False)), DESIGN, settings=settings)
+        for table, settings in ((readings, stated), (readings.assign(u_um=0.35), None))
+    )
+    found, expected = (
+        reading_uncertainties(one.design, one.design.readings) for one in (plain, column)
+    )
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
+    assert any(wording.IS_UM_IN_ALL_ROWS in one for one in plain.remarks)
 
 
 @pytest.mark.parametrize(
@@ -152,9 +138,7 @@ def test_what_cannot_be_of_all_rows_is_refused(columns: dict[str, str], text: st
         bp.quickstart().with_(readings={"columns": columns})
 
 
-def test_an_uncertainty_without_a_unit_is_not_taken_for_one_in_that_of_co_ordinates(
-    experiment: Experiment,
-) -> None:
+def test_an_uncertainty_without_a_unit_is_not_taken_for_one_in_that_of_co_ordinates() -> None:
     for heads, cells in (("u", "0.2"), ("standard uncertainty", "0.0002"), ("u,D_mm", "0.2,20")):
         with pytest.raises(ExperimentError, match="has no unit"):
-            uncertainties(experiment, heads, cells)
+            uncertainties(heads, cells)

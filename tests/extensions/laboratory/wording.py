@@ -85,7 +85,6 @@ NOR_NUMBERS_THAT_FIT = "nor numbers in reading order that fit; write the names"
 NO_WRITE_A = "lab.csv:6:1: no x; write a number, or remove the line"
 NO_Y_WRITE = "2:1: no y; write a number"
 PLACED_BY_THE_NOMINAL_POSES = "placed by the nominal poses"
-PLANNED_BUT_NOT_READ = "planned but not read (3)"
 PLANNED_BUT_NOT_READ_2 = "planned but not read"
 POSITIONS_MATCHED_BY_NAME_BUT = "positions matched by name, ignoring case and signs: "
 POSITIONS_MATCHED_BY_NUMBER = "positions matched by number and location"
@@ -111,9 +110,6 @@ THE_DEVIATION_IS_NOT_MEASURED_MINUS = (
 THE_ERRORS_THAT_IT_LEAVES = "the errors that it leaves"
 THE_FILE_IS_NAMED_TWICE = "the file is named twice"
 THE_FILE_STATES_NO_UNIT = "the file states no unit of length; state it with --unit mm"
-THE_HEADING_OCCURS_MORE_THAN_ONCE = (
-    't.csv:1:1: the heading "X" occurs more than once, and could be x'
-)
 THE_NAMES_CAN_BE_READ = (
     "f: the names can be read as {position}_{ball}_{probe} and {position}_{probe}_{ball}; "
     "state the one that is right with --name"
