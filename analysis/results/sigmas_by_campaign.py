@@ -189,7 +189,7 @@ def _without_maps(
     drawn = as_drawn(without)
     fit = gauss_newton(without, x, solution.state, held_spectrum=drawn)
     freedom = without.observation_count - without.parameter_count + drawn.deficiency
-    freedom -= implied_values(without, fit.state.balls)
+    freedom -= implied_values(without, fit.state)
     if fit.status != "converged" or freedom <= 0:
         return math.nan, 0
     return math.sqrt(fit.factor.sum_of_squares / freedom), freedom

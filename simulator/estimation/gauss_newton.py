@@ -149,7 +149,7 @@ def _tells_of_open(
     from scipy.special import fdtrc
 
     freedom = design.observation_count - design.parameter_count
-    freedom -= implied_values(design, followed.state.balls)
+    freedom -= implied_values(design, followed.state)
     if freedom <= 0:
         return False
     sum_left = followed.factor.sum_of_squares
@@ -173,7 +173,7 @@ def linearised_fit(design: Design, solution: Solution) -> Linearisation:
     """Return the linearisation at an estimate, with the null directions of the nominal design."""
     drawn = linearise(design) if solution.spectrum.deficiency else None
     layout, state = solution.factor.layout, solution.state
-    implied = implied_values(design, state.balls)
+    implied = implied_values(design, state)
     return Linearisation(design, layout, state, solution.factor, solution.spectrum, drawn, implied)
 
 

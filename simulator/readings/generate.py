@@ -17,6 +17,7 @@ from ..design.arrays import (
     nominal_state,
     reading_uncertainties,
 )
+from ..design.observations.balls import slopes_apart
 from ..design.observations.joint_lengths import FLAT
 from ..design.observations.lengths import Lengths
 from ..design.observations.whitening import at_least_exact
@@ -108,6 +109,10 @@ def true_artefacts(design: Design, generator: np.random.Generator) -> Array:
     balls = design.balls.places.copy()
     certified = [kind for kind in design.observations if kind.balls.shape[1]]
     rows = [kind.rows(design, nominal_state(design), None) for kind in certified]
+    rows = [
+        replace(block, by_ball=slopes_apart(design, kind, block.by_ball))
+        for kind, block in zip(certified, rows, strict=True)
+    ]
     d = design.dimension
     sought = [
         kind.whitened(kind.errors(generator, 1)[0]) - block.residual

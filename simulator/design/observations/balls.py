@@ -7,10 +7,33 @@ from typing import Self
 
 import numpy as np
 
+from ...computing.decompositions import svd
 from ...inputs.number_arrays import Flags
 from ...machines.protocol import Array, ErrorModel
 from ..arrays import Design, Observations, Replicates, Rows, State
 from .whitening import EXACT
+
+# Extent of an artefact in parts of its largest one below which it has none in a direction.
+FLAT = 0.01
+
+
+def slopes_apart(design: Design, kind: Observations, slope: Array) -> Array:
+    """Return the slopes (m, k, d) of observations by their balls without those that tell of motions
+    out of the plane, or off the line, of an artefact's balls.
+
+    Distances in a plane do not change by such motions but to second order, and their slopes there
+    are those of the plate's flatness.
+    """
+    result = slope.copy()
+    is_relative = np.abs(slope.sum(axis=1)).max(axis=1) < 1e-9 * np.abs(slope).max(axis=(1, 2))
+    artefact = design.balls.artefact[kind.balls[:, 0]]
+    for one in np.unique(artefact[is_relative]):
+        rows = is_relative & (artefact == one)
+        places = design.balls.places[design.balls.artefact == one]
+        _, sizes, directions = svd(places - places.mean(axis=0), full_matrices=False)
+        along = directions[sizes > FLAT * sizes[0]]
+        result[rows] = slope[rows] @ along.T @ along
+    return result
 
 
 class BallObservations(Observations):
