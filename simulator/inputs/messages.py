@@ -62,7 +62,7 @@ def folded(messages: Iterable[Message]) -> Iterator[Message]:
 
     >>> for message in folded([Message("a.csv", n, 1, "", "no x") for n in range(2, 7)]):
     ...     print(message)
-    a.csv:2:1: no x (and so in 4 more lines, to line 6)
+    a.csv:2:1: no x (and so in 4 more places, to line 6)
     """
     alike: dict[tuple[str, str, str], list[Message]] = {}
     for message in messages:
@@ -71,7 +71,7 @@ def folded(messages: Iterable[Message]) -> Iterator[Message]:
         if len(others) < FEW_ALIKE:
             yield from (first, *others)
         else:
-            where = f"(and so in {len(others)} more lines, to line {others[-1].line})"
+            where = f"(and so in {len(others)} more places, to line {others[-1].line})"
             yield replace(first, text=f"{first.text} {where}")
 
 
