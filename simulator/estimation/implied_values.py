@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..computing.decompositions import eigvalsh
-from ..design.arrays import Design, Observations, State
+from ..design.arrays import Design, State
 from ..design.observations.balls import BallObservations, slopes_apart
 
 # Probability with which measured values contradict each other as little as computed ones.
@@ -42,7 +42,7 @@ def implied_values(design: Design, state: State) -> int:
     return count
 
 
-def _implied(design: Design, state: State, kinds: list[Observations], artefact: int) -> int:
+def _implied(design: Design, state: State, kinds: list[BallObservations], artefact: int) -> int:
     """Return the same of some kinds, of one artefact."""
     from scipy.sparse import block_array, csr_array, diags_array
     from scipy.sparse.linalg import lsmr
