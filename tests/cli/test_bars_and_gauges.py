@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.extensions.sweeps.fingerprint import fingerprint
 from ballplate.simulator.experiment.loading import load
 
 from tests.cli import wording
@@ -262,25 +261,6 @@ def test_simulate_run_trials_and_fit_go_together(
     for symbol in ("U2", "U3", "U4", "U6"):
         spread = trials[symbol]["spread_ratio"]
         assert abs(spread["value"] - 1.0) < 4.0 * spread["standard_error"]
-
-
-@pytest.mark.parametrize(
-    ("old", "new"),
-    [
-        ("radius: 300 mm", "radius: 301 mm"),
-        ("azimuths: 12", "azimuths: 13"),
-        ("standard_uncertainty: 0.5 um", "value: 300.001 mm, standard_uncertainty: 0.5 um"),
-        ("{kind: metric}", "{kind: metric, scale: none}"),
-    ],
-)
-def test_fingerprints_tell_gauges_apart(tmp_path: Path, old: str, new: str) -> None:
-    text = Path(GAUGE).read_text(encoding="utf-8").split("variants:")[0].split("true_machine:")
-    text = text[0] + "probes:" + text[1].partition("probes:")[2]
-    assert old in text
-    for name, content in (("a.yaml", text), ("b.yaml", text.replace(old, new))):
-        (tmp_path / name).write_text(content, encoding="utf-8")
-    one, other = (fingerprint(load(tmp_path / name)[0]) for name in ("a.yaml", "b.yaml"))
-    assert one != other
 
 
 def test_all_mistakes_of_a_gauge_are_told_at_once(

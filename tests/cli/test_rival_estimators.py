@@ -17,12 +17,10 @@ from ballplate.estimators.distances import (
     count_terms,
 )
 from ballplate.simulator.estimation.alternative_estimators import AlternativeName
-from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.truth import true_machine
-from ballplate.uncertainty.summaries import uncertainties
 
 from tests.cli import wording
 from tests.reference.small_quickstart import small_sections
@@ -190,10 +188,3 @@ def test_errors_against_the_true_machine_are_those_of_the_distances(
         np.testing.assert_allclose(one.rms, np.sqrt((errors**2).mean()))
     assert result.to_dict()["against_truth"]["full"]["rms"] == result.of_truth["full"].rms
     assert wording.DISTANCES_AGAINST_THE_TRUE_MACHINES in "\n".join(result.lines())
-
-
-def test_where_distances_are_undetermined_there_is_no_truth_to_miss() -> None:
-    (experiment,) = load(Path("designs/certified/deficient.yaml"))
-    quantities = uncertainties(linearise(lay_out(experiment)))
-    found = compare_estimators(experiment, 2, points=3)
-    assert (found.of_truth == {}) == (quantities["U6"].undetermined > 0)

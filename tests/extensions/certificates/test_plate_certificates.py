@@ -70,18 +70,3 @@ def test_wrong_usage_is_told_in_one_line(folder: Path, capsys: pytest.CaptureFix
     ):
         assert main([more[0], experiment, *more[1:]]) == 2
         assert told in capsys.readouterr().err.splitlines()[-1]
-
-
-def test_a_plate_without_a_calibration_has_no_certificate(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    sections = yaml.safe_load((folder / "e.yaml").read_text())
-    sections |= {"calibration": [], "probes": {"down": sections["probes"]["down"]}}
-    sections["positions"] = [one | {"probes": ["down"]} for one in sections["positions"][:3]]
-    (folder / "u.yaml").write_text(yaml.safe_dump(sections))
-    readings = bp.simulate(bp.load(folder / "u.yaml"))
-    readings.to_csv(folder / "u.csv", index=False)
-    line = ["certificate", str(folder / "u.yaml"), str(folder / "u.csv")]
-    assert main([*line, "-o", str(folder / "u.html")]) == 3
-    assert "determine no length of the plate" in capsys.readouterr().err
-    assert not (folder / "u.html").exists()

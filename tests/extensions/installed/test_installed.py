@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import csv
 import io
-import re
 import shutil
 from pathlib import Path
 from typing import Any
@@ -139,12 +138,6 @@ def test_laser_lengths_count_as_in_a_dense_computation(told: dict[str, Any]) -> 
         assert quantity["maximum"] == pytest.approx(values.max(), rel=1e-6)
 
 
-def test_replicates_scatter_as_laser_lengths_let_them(told: dict[str, Any]) -> None:
-    for quantity in told["trials"].values():
-        ratio = quantity["spread_ratio"]
-        assert abs(ratio["value"] - 1.0) < 4.0 * ratio["standard_error"]
-
-
 def test_a_certificate_that_simulate_writes_is_read_by_fit(told: dict[str, Any]) -> None:
     assert told["simulate"][0] == 0
     rows = list(csv.DictReader(io.StringIO(told["certificate"].partition("\n")[2])))
@@ -156,38 +149,6 @@ def test_a_certificate_that_simulate_writes_is_read_by_fit(told: dict[str, Any])
     fit = told["fit"]
     assert fit["status"] == "converged" and 0.7 < fit["sigma"] < 1.3
     assert told["report"][0] == 0 and "U7" in told["page"] and "climate" not in told["page"]
-
-
-def test_a_plan_chooses_a_laser_length_and_writes_it(told: dict[str, Any]) -> None:
-    chosen = yaml.safe_load(told["chosen"])
-    assert [item["kind"] for item in chosen["calibration"]] == ["distances", *["laser"] * 3]
-    assert chosen["climate"] == LASER["climate"] and chosen["extensions"] == LASER["extensions"]
-    best = told["run chosen"]["quantities"]["U6"]["average"]
-    assert told["plan"]["value"] == pytest.approx(best, rel=1e-6)
-
-
-def test_other_commands_name_it(told: dict[str, Any]) -> None:
-    assert told["check"][0] == 0 and "certificates of the machine" in told["check"][1]
-    assert told["compare"][0] == 0
-    assert told["reliability"][0] == 0 and "laser length" in told["reliability"][1]
-    assert told["studio"] == ["our_laboratory"] and told["section"] == ["cellar", 8.0]
-
-
-def test_the_budget_has_its_source_and_its_quantity(told: dict[str, Any]) -> None:
-    figures = {figure.pop("figure"): figure for figure in told["budget"]["figures"]}
-    sources = {part["source"] for part in figures["U6"]["contributions"]}
-    assert any("laser of the machine" in source for source in sources), sources
-    # The quantity and the budget itself take the same corners, in another order.
-    parts: dict[frozenset[str], list[list[float]]] = {}
-    for name, figure in figures.items():
-        if "diagonal" in name:
-            ends = frozenset(re.findall(r"\(.*?\)", figure["description"]))
-            shares = [part["standard_uncertainty"] for part in figure["contributions"]]
-            parts.setdefault(ends, []).append(shares)
-    assert len(parts) == 4
-    for of_quantity, of_budget in parts.values():
-        assert len(of_quantity) > 1
-        assert of_quantity == pytest.approx(of_budget, rel=1e-9, abs=1e-15)
 
 
 def test_a_map_names_the_extension_that_its_error_model_needs(told: dict[str, Any]) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import ballplate as bp
 import pytest
 from ballplate.cli import main
-from ballplate.extensions.laboratory.feature_names import fold, named, position_of_file
+from ballplate.extensions.laboratory.feature_names import named, position_of_file
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.name_rules import check_rule
 from ballplate.simulator.inputs.messages import ExperimentError
@@ -54,13 +54,6 @@ def test_numbers_are_told_and_names_come_first() -> None:
     assert named(["zlow_07_down"], None, DESIGN, "f").numbered == ("ball",)
     assert named(["zlow_r1c1_down"], None, DESIGN, "f").numbered == ()
     assert parts(["zlow_r1c1_down", "zlow_07_down"])[2] is None
-
-
-def test_a_rule_that_is_given_counts() -> None:
-    names = ["M1-z low/r1c1", "M1-z low/r1c2", "other"]
-    found = parts(names, "M1-{position}/{ball}")
-    assert found[1:] == [("z low", "r1c1"), ("z low", "r1c2"), None]
-    assert wording.NO_NAMES_OF_THE_EXPERIMENT_2 in refusal(["r1c1"], "{position}_{ball}")
 
 
 def test_what_can_be_read_in_two_ways_is_refused(tmp_path: Path) -> None:
@@ -127,11 +120,6 @@ def test_a_file_tells_the_position_if_no_name_does() -> None:
             position_of_file(stem, DESIGN, "f")
 
 
-def test_folding() -> None:
-    assert fold("Lage 01, Kugel-007 (groß)") == "lage1kugel7gross"
-    assert fold("1_25") == fold("01.25") != fold("12_5")
-
-
 SPHERES = "UNITS/MM\nSNSLCT/SA({sensor})\nFA({name})=FEAT/SPHERE,OUTER,CART,1,2,3,4\nENDFIL\n"
 
 
@@ -194,14 +182,3 @@ def test_points_of_one_name_and_their_numbers_are_those_of_a_ball(tmp_path: Path
     told = found.told
     assert told[0].endswith("taken: 1 sphere centre; left: nothing")
     assert told[1].startswith(wording.CENTRE_IS_OF_POINTS)
-
-
-def test_circles_are_taken_when_asked_for(tmp_path: Path) -> None:
-    path = tmp_path / "a.txt"
-    text = "DIM A= LOCATION OF CIRCLE zlow_r1c1_down UNITS=MM\nAX MEAS\nX 1.5\nY 2.5\nZ 3.5\n"
-    path.write_text(text, encoding="utf-8")
-    with pytest.raises(ExperimentError, match="1 circle"):
-        bp.read_report(path, QUICKSTART)
-    found = bp.read_report(path, QUICKSTART, circles=True)
-    assert found.to_frame()["y_mm"].tolist() == [2.5]
-    assert "taken: 1 circle centre" in found.told[0]

@@ -6,9 +6,7 @@ from __future__ import annotations
 
 import csv
 from pathlib import Path
-from typing import Any
 
-import ballplate as bp
 import numpy as np
 import pandas as pd
 import pytest
@@ -39,20 +37,6 @@ def scale_readings(centres: pd.DataFrame) -> pd.DataFrame:
     return found
 
 
-def estimates(table: pd.DataFrame) -> dict[str, Any]:
-    return bp.fit(CAMPAIGN, table).to_dict()
-
-
-def numbers(found: object) -> list[float]:
-    """All numbers of plain data, in its order."""
-    if isinstance(found, dict):
-        return [number for one in found.values() for number in numbers(one)]
-    if isinstance(found, list):
-        return [number for one in found for number in numbers(one)]
-    is_number = isinstance(found, int | float) and not isinstance(found, bool)
-    return [float(found)] if is_number else []  # type: ignore[arg-type]
-
-
 def test_there_are_reports_of_every_format() -> None:
     told = " ".join(row["format"] for row in REPORTS)
     assert len(REPORTS) >= 9
@@ -75,19 +59,3 @@ def test_a_report_imports_to_the_readings_of_the_plain_table(
     unit = 25.4 if "inch" in row["unit"] else 1.0
     tolerance = unit * 10.0 ** -int(row["digits"]) if "points" in row["file"] else 1e-8
     assert np.abs(found[AXES] - expected[AXES]).to_numpy().max() < tolerance
-
-
-def test_points_on_the_surface_fit_to_the_estimates_within_the_rounding_of_points() -> None:
-    (row,) = (row for row in REPORTS if "points" in row["file"])
-    imported = bp.read_report(FOLDER / row["file"], CAMPAIGN).to_frame()
-    found = np.array(numbers(estimates(in_order(scale_readings(imported)))))
-    plain = in_order(pd.read_csv(FOLDER / row["plain"]))
-    expected, generator = np.array(numbers(estimates(plain))), np.random.default_rng(3)
-    spread = np.zeros(len(expected))
-    for _ in range(10):
-        rounded = plain.copy()
-        rounded[AXES] += generator.uniform(-0.5, 0.5, (len(plain), 3)) * 10.0 ** -int(row["digits"])
-        spread += (np.array(numbers(estimates(rounded))) - expected) ** 2 / 10
-    # Every number within five standard deviations of what rounding the readings alone would do.
-    assert (np.abs(found - expected) <= 5 * np.sqrt(spread) + 1e-12).all()
-    assert np.sqrt(spread).max() > 0.0

@@ -6,13 +6,11 @@ from __future__ import annotations
 
 import csv
 import json
-import re
 import sys
 import tracemalloc
 from pathlib import Path
 from zipfile import ZIP_DEFLATED, ZipFile
 
-import ballplate as bp
 import pytest
 from ballplate.cli import main
 from openpyxl import Workbook
@@ -104,17 +102,6 @@ def test_an_export_fits_after_the_answer_to_one_question(
     assert found is None and question in err and err.count("\n") == 1, err
     found, err = fitted(capsys, export(name, tmp_path), *answer)
     assert found == expected, err
-
-
-def test_merged_cells_and_sheets_are_read_from_python(tmp_path: Path) -> None:
-    plain = bp.fit(PLATE, PLAIN).to_dict()["estimates"]
-    merged = bp.fit(PLATE, FOLDER / "merged-en.csv", fill_down=True)
-    assert merged.to_dict()["estimates"] == plain
-    half = len(rows()) // 2
-    path = workbook(tmp_path, {"Monday": rows()[:half], "Tuesday": rows()[half:]})
-    assert bp.fit(PLATE, path, sheet="all").to_dict()["estimates"] == plain
-    with pytest.raises(bp.ExperimentError, match=re.escape(wording.NO_SHEET)):
-        bp.fit(PLATE, path, sheet="Friday")
 
 
 def test_every_export_is_tried() -> None:

@@ -76,14 +76,6 @@ def test_certificate_values_belong_elsewhere(
         assert "under calibration: values: sides.csv" in text
 
 
-def test_an_own_table_with_names_of_columns_is_not_taken_for_a_report(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    """Who says which columns are meant is told what is wrong with these."""
-    text = refusal(capsys, SAMPLES / "calypso_fet.txt", "--columns", "ball=Kugel")
-    assert 'no column "Kugel"' in text and "ballplate import" not in text
-
-
 def test_a_file_that_is_named_twice(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     readings, link = tmp_path / "readings.csv", tmp_path / "link.csv"
     assert main(["simulate", DESIGN, "-o", str(readings)]) == 0

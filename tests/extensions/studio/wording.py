@@ -1,7 +1,6 @@
 """The wording that the tests of studio expect: a rewording is entered here alone."""
 
 ALL_CHANGES_ARE_SAVED = "all changes are saved"
-BELOW_THE_MEASURING_VOLUME = "below the measuring volume"
 CHANGES_ARE_NOT_SAVED_AND_ARE_IN_PLATE = (
     "changes are not saved, and are in .plate.yaml.unsaved: the same command restores them"
 )
