@@ -127,9 +127,6 @@ def test_a_narrow_range_of_sizes_is_found(place: int) -> None:
             distance = min(wide, 0.2 + narrow)
             return Tried(str(step), Judgement(distance <= 0.4, distance, "", 0), 0, "")
 
-        def is_right(self, step: int) -> bool:
-            return step in steps
-
     trials = Stub(sought, searched)
     steps_met = [step for step in steps if trials._tried(step).is_met]
     assert steps_met
