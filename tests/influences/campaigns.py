@@ -39,7 +39,7 @@ def file_with(folder: Path, influences: list[dict[str, Any]] | None, **changed: 
     told = small_sections(20, true_machine={"kind": "zero"}, sigma="given")
     told |= {"influences": influences} if influences else {}
     path = folder / "file.yaml"
-    path.write_text(yaml.safe_dump(told | changed, sort_keys=False), encoding="utf-8")
+    path.write_text(yaml.safe_dump(told | changed), encoding="utf-8")
     return load(path)[0]
 
 

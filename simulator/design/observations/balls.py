@@ -16,10 +16,13 @@ from .whitening import EXACT
 # Extent of an artefact in parts of its largest one below which it has none in a direction.
 FLAT = 0.01
 
+# Slopes out of the plane, in parts of those in it, from which on an observation is of heights.
+HEIGHT = 0.5
+
 
 def slopes_apart(design: Design, kind: Observations, slope: Array) -> Array:
-    """Return the slopes (m, k, d) of observations by their balls without those that tell of motions
-    out of the plane, or off the line, of an artefact's balls.
+    """Return the slopes (m, k, d) of observations by their balls, those of distances without what
+    they tell of motions out of the plane, or off the line, of an artefact's balls.
 
     Distances in a plane do not change by such motions but to second order, and their slopes there
     are those of the plate's flatness.
@@ -28,11 +31,15 @@ def slopes_apart(design: Design, kind: Observations, slope: Array) -> Array:
     is_relative = np.abs(slope.sum(axis=1)).max(axis=1) < 1e-9 * np.abs(slope).max(axis=(1, 2))
     artefact = design.balls.artefact[kind.balls[:, 0]]
     for one in np.unique(artefact[is_relative]):
-        rows = is_relative & (artefact == one)
+        rows = np.flatnonzero(is_relative & (artefact == one))
         places = design.balls.places[design.balls.artefact == one]
         _, sizes, directions = svd(places - places.mean(axis=0), full_matrices=False)
         along = directions[sizes > FLAT * sizes[0]]
-        result[rows] = slope[rows] @ along.T @ along
+        within = slope[rows] @ along.T @ along
+        # Heights above a plane tell of little else.
+        out = np.linalg.norm(slope[rows] - within, axis=(1, 2))
+        is_distance = out < HEIGHT * np.linalg.norm(within, axis=(1, 2))
+        result[rows[is_distance]] = within[is_distance]
     return result
 
 
