@@ -90,6 +90,7 @@ def test_it_runs_the_commands_of_the_readme() -> None:
         command("test command").replace("/bin/", "/Scripts/").replace("python3 ", "python ")
     )
     with_browser = scripts.pop(2).splitlines()
+    assert scripts.pop().endswith("pytest -m long tests/docs")
     assert scripts == [".ci/run", "\n".join(on_windows.split(" && ")), command("oldest versions")]
     contributing = Path("CONTRIBUTING.md").read_text(encoding="utf-8")
     assert with_browser[0] == "python -m venv .venv"
