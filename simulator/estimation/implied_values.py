@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from ..computing.decompositions import eigvalsh
 from ..design.arrays import Design, State
 from ..design.observations.balls import BallObservations, slopes_apart
+from ..machines.protocol import Array
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 # Probability with which measured values contradict each other as little as computed ones.
 AGREEING = 1e-2
@@ -30,40 +36,39 @@ def implied_values(design: Design, state: State) -> int:
         for kind in design.observations
         if isinstance(kind, BallObservations) and len(kind)
     ]
-    tying = [kind for kind in kinds if kind.balls.shape[1] > 1]
+    tying = [number for number, kind in enumerate(kinds) if kind.balls.shape[1] > 1]
     if not tying:
         return 0
+    from scipy.sparse import csr_array, vstack
+
+    d, blocks, residuals, numbers, artefacts = design.dimension, [], [], [], []
+    for number, kind in enumerate(kinds):
+        rows = np.flatnonzero(np.isin(kind.balls, design.tied_balls).all(axis=1))
+        block, balls = kind.rows(design, state, None), kind.balls[rows]
+        slope = slopes_apart(design, kind, block.by_ball)[rows]
+        columns = d * balls[:, :, None] + np.arange(d)
+        ends = np.arange(len(rows) + 1) * d * balls.shape[1]
+        shape = (len(rows), d * len(design.balls.places))
+        blocks.append(csr_array((slope.ravel(), columns.ravel(), ends), shape=shape))
+        residuals.append(block.residual[rows])
+        numbers.append(np.full(len(rows), number))
+        artefacts.append(design.balls.artefact[balls[:, 0]])
+    matrix, residual = vstack(blocks, format="csr"), np.concatenate(residuals)
+    of_kind, artefact = np.concatenate(numbers), np.concatenate(artefacts)
     count = 0
-    for artefact in np.unique(
-        np.concatenate([design.balls.artefact[k.balls[:, 0]] for k in tying])
-    ):
-        groups = [kinds, *([kind] for kind in tying)] if len(kinds) > 1 else [kinds]
-        count += max(_implied(design, state, group, artefact) for group in groups)
+    for one in np.unique(artefact):
+        here = artefact == one
+        groups = [here] if len(kinds) == 1 else [here, *(here & (of_kind == k) for k in tying)]
+        count += max(_implied(matrix[group], residual[group]) for group in groups if group.any())
     return count
 
 
-def _implied(design: Design, state: State, kinds: list[BallObservations], artefact: int) -> int:
-    """Return the same of some kinds, of one artefact."""
-    from scipy.sparse import block_array, csr_array, diags_array
+def _implied(matrix: csr_array, residual: Array) -> int:
+    """Return the same of some rows: derivatives by the balls (m, n d) with residuals (m,)."""
+    from scipy.sparse import diags_array
     from scipy.sparse.linalg import lsmr
     from scipy.special import chdtr
 
-    d, blocks, residuals = design.dimension, [], []
-    for kind in kinds:
-        rows = np.flatnonzero(
-            (design.balls.artefact[kind.balls[:, 0]] == artefact)
-            & np.isin(kind.balls, design.tied_balls).all(axis=1)
-        )
-        block = kind.rows(design, state, None)
-        slope = slopes_apart(design, kind, block.by_ball)[rows]
-        columns = d * kind.balls[rows][:, :, None] + np.arange(d)
-        places = np.repeat(np.arange(len(rows)), columns[0].size if len(rows) else 0)
-        shape = (len(rows), d * len(design.balls.places))
-        blocks.append([csr_array((slope.ravel(), (places, columns.ravel())), shape=shape)])
-        residuals.append(block.residual[rows])
-    matrix, residual = block_array(blocks).tocsr(), np.concatenate(residuals)
-    if not len(residual):
-        return 0
     matrix = matrix[:, np.flatnonzero(np.abs(matrix).sum(axis=0) > 0.0)]
     sizes = np.sqrt(matrix.power(2).sum(axis=1))
     unit = diags_array(1.0 / np.where(sizes > 0.0, sizes, 1.0)) @ matrix

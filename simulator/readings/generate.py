@@ -109,10 +109,6 @@ def true_artefacts(design: Design, generator: np.random.Generator) -> Array:
     balls = design.balls.places.copy()
     certified = [kind for kind in design.observations if kind.balls.shape[1]]
     rows = [kind.rows(design, nominal_state(design), None) for kind in certified]
-    rows = [
-        replace(block, by_ball=slopes_apart(design, kind, block.by_ball))
-        for kind, block in zip(certified, rows, strict=True)
-    ]
     d = design.dimension
     sought = [
         kind.whitened(kind.errors(generator, 1)[0]) - block.residual
@@ -136,7 +132,8 @@ def true_artefacts(design: Design, generator: np.random.Generator) -> Array:
             columns = d * among[kind.balls[joint]][:, :, None] + np.arange(d)
             together.append(np.zeros((len(joint), d * len(ends))))
             row = np.broadcast_to(np.arange(len(joint))[:, None, None], columns.shape)
-            np.add.at(together[-1], (row, columns), block.by_ball[joint])
+            slopes = slopes_apart(design, kind, block.by_ball)[joint]
+            np.add.at(together[-1], (row, columns), slopes)
             sides.append(side[joint])
     balls += np.divide(pull, stiffness, out=np.zeros(balls.shape), where=stiffness > 0)
     if len(ends):

@@ -15,24 +15,12 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.stats import chi2
 
+from tests.reference.small_plate import PLATE
 from tests.reference.small_quickstart import small_quickstart
 
 QUICKSTART = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
 
-SMALL = """
-title: small
-machine: {volume: [600 mm, 500 mm, 400 mm], repeatability: 0.5 um}
-error_model: {kind: metric}
-probes: {down: [0 mm, 0 mm, -50 mm], right: [60 mm, 0 mm, 0 mm]}
-artefacts: {plate: {kind: grid, balls: [2, 2], size: [300 mm, 300 mm]}}
-positions:
-  - {name: low, plane: z, level: 100 mm, corner: {x: 50 mm, y: 50 mm}, probes: [down]}
-  - {name: wall, plane: x, level: 200 mm, corner: {y: 50 mm, z: 45 mm}, probes: [right, down]}
-  - {name: side, plane: y, level: 200 mm, corner: {z: 45 mm, x: 50 mm}, probes: [down]}
-calibration:
-  - {kind: distances, pairs: all, standard_uncertainty: 0.5 um}
-evaluation: {points: {random: 8, seed: 1}, probe: down}
-"""
+SMALL = PLATE.replace("balls: [3, 3]", "balls: [2, 2]")
 
 
 def loaded(folder: Path, text: str) -> bp.Experiment:
@@ -87,8 +75,7 @@ PLACES = "{kind: coordinates, balls: all, standard_uncertainty: 0.5 um}"
 def test_noise_alone_contradicts_nothing_where_values_agree_exactly(
     certificates: list[str], tmp_path: Path
 ) -> None:
-    listed = "".join(f"\n  - {one}" for one in certificates)
-    given = loaded(tmp_path, SMALL.replace(f"\n  - {DISTANCES}}}", listed))
+    given = loaded(tmp_path, SMALL.replace(DISTANCES + "}", ", ".join(certificates)))
     fits = [bp.fit(given, bp.simulate(given, seed=seed)) for seed in range(6)]
     found = [fit.diagnosis.findings for fit in fits if fit.diagnosis is not None]
     # At a level of 1 %.

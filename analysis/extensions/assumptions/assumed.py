@@ -241,11 +241,8 @@ def _chain(experiment: Experiment, _: Mapping[str, Any]) -> PredictionAssumption
     if arrangement not in EXCHANGED:
         return None
     other = EXCHANGED[arrangement]
-    machine, source = (
-        _section(experiment, "true_machine") or {},
-        "the random errors of true_machine",
-    )
-    instead = other
+    machine = _section(experiment, "true_machine") or {}
+    instead, source = other, "the random errors of true_machine"
     if machine.get("kind") != "random":
         machine = {"kind": "random", "position": "2 um", "rotation": "4 urad", "seed": 1}
         instead, source = f"{other}, with errors of 2 µm and 4 µrad", "random errors"

@@ -14,7 +14,7 @@ from ..arrays import Design, Observations, Replicates, Rows, State
 from .whitening import EXACT
 
 # Extent of an artefact in parts of its largest one below which it has none in a direction.
-FLAT = 0.01
+THIN = 0.01
 
 # Slopes out of the plane, in parts of those in it, from which on an observation is of heights.
 HEIGHT = 0.5
@@ -34,7 +34,7 @@ def slopes_apart(design: Design, kind: Observations, slope: Array) -> Array:
         rows = np.flatnonzero(is_relative & (artefact == one))
         places = design.balls.places[design.balls.artefact == one]
         _, sizes, directions = svd(places - places.mean(axis=0), full_matrices=False)
-        along = directions[sizes > FLAT * sizes[0]]
+        along = directions[sizes > THIN * sizes[0]]
         within = slope[rows] @ along.T @ along
         # Heights above a plane tell of little else.
         out = np.linalg.norm(slope[rows] - within, axis=(1, 2))
