@@ -52,7 +52,7 @@ def small_sections(
     """
     text = (Path(__file__).parents[2] / "designs" / "quickstart.yaml").read_text(encoding="utf-8")
     told: dict[str, Any] = yaml.safe_load(in_lengths(text) if kept else text)
-    told["artefacts"] = {"plate": PLATE}
+    told["artefacts"] = {"plate": dict(PLATE)}
     told["error_model"] |= {"position_coefficients": 3, "rotation_coefficients": 3}
     told["evaluation"]["points"] = {"random": points, "seed": seed}
     return told | changes
