@@ -108,6 +108,7 @@ def folded(text: str) -> str:
     return " ".join(word.lstrip("0") or "0" if word.isdigit() else word for word in words)
 
 
+@lru_cache(maxsize=100_000)
 def heading(cell: str) -> tuple[str, str | None]:
     """The name of a column, folded, and the unit that its heading states.
 
@@ -131,6 +132,7 @@ def unit_of(cell: str) -> str | None:
     return UNITS.get(plain_unit(cell).strip().strip("[]() ").casefold())
 
 
+@lru_cache(maxsize=100_000)
 def unit_of_further(cell: str, name: str) -> str | None:
     """Return the unit of a heading that names a further column, empty without one; None for other
     headings.

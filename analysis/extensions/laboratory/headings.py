@@ -382,11 +382,13 @@ def _found_groups(cells: Sequence[str], words: Vocabulary) -> tuple[Group, ...] 
     for i, (name, _) in enumerate(parsed):
         parts = name.split()
         for k, axis in enumerate(parts):
+            if axis not in words.axes:
+                continue
             other_parts = [*parts[:k], *parts[k + 1 :]]
             beside = " ".join(other_parts)
             if beside not in words.beside_axes:
                 beside = " ".join(word for word in other_parts if word not in MEASURED)
-            if axis in words.axes and beside in words.beside_axes:
+            if beside in words.beside_axes:
                 columns_by_group.setdefault(beside, {}).setdefault(axis, []).append(i)
     groups = {
         beside: axes for beside, axes in columns_by_group.items() if set(axes) == set(words.axes)

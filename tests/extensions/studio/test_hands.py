@@ -157,9 +157,8 @@ def test_a_place_is_asked_for_on_the_floor(page) -> None:
     settled(page, 2)
     fingers = Fingers(page)
     fingers("touchStart", spot(page, at))
-    page.wait_for_timeout(700)
+    until(page, "window.calls.filter(([called]) => called === 'onPlace').length === 2")
     fingers("touchEnd")
-    assert len(calls(page, "onPlace")) == 2
     settled(page, 3)
     page.click("#undo")
     settled(page, 4)
