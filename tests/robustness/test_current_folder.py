@@ -187,7 +187,9 @@ def test_the_package_run_as_a_module_takes_the_folder_off_its_path(
     assert_nothing_ran(outcome(folder, "-m", "ballplate", *line.split()), folder)
 
 
-@pytest.mark.parametrize("method", ["loky", "alone", "spawn", "forkserver"])
+@pytest.mark.parametrize(
+    "method", ["loky", "alone", "spawn", pytest.param("forkserver", marks=pytest.mark.long)]
+)
 def test_no_process_that_is_started_in_python_does(
     method: str, folder: Path, tmp_path: Path
 ) -> None:

@@ -203,8 +203,8 @@ def assert_same_data(one: Any, other: Any, place: str = "") -> None:
 @pytest.mark.parametrize(
     ("kernel", "is_whole"),
     [
-        ("Prescott", False),
-        *(pytest.param(kernel, True, marks=pytest.mark.long) for kernel in KERNELS),
+        pytest.param(kernel, is_whole, marks=pytest.mark.long)
+        for kernel, is_whole in [("Prescott", False), *((kernel, True) for kernel in KERNELS)]
     ],
 )
 def test_the_same_is_told_with_every_kernel(

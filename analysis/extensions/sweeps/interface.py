@@ -46,8 +46,10 @@ def sweep(
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     sweep("designs/sweeps/plate-size.yaml", f"{folder}/plates.sqlite")
-    <SweepResult of plate-size: 12 cases, 12 done, 0 failed>
+    ...     path = f"{folder}/plates.sqlite"
+    ...     computed = sweep("designs/sweeps/plate-size.yaml", path)
+    ...     computed, stored(path).to_frame().equals(computed.to_frame())
+    (<SweepResult of plate-size: 12 cases, 12 done, 0 failed>, True)
     """
     from .load import load_sweep
     from .running import computed
@@ -67,13 +69,6 @@ def stored(store: PathLike, sweep: int | None = None) -> SweepResult:
     far.
 
     :raises StoreError: the store cannot be used, or is damaged.
-
-    >>> import tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     path = f"{folder}/plates.sqlite"
-    ...     computed = sweep("designs/sweeps/plate-size.yaml", path)
-    ...     stored(path).to_frame().equals(computed.to_frame())
-    True
     """
     from contextlib import closing
 

@@ -102,7 +102,8 @@ def row_seconds(store: Path) -> dict[tuple[str, int], float]:
 
 
 # At each commit, or at each statement.
-@pytest.mark.parametrize("every", [10**6, pytest.param(1, marks=pytest.mark.long)])
+@pytest.mark.long
+@pytest.mark.parametrize("every", [10**6, 1])
 def test_killed_before_a_statement(tmp_path: Path, every: int) -> None:
     """No row that was stored is lost or computed twice, that of a replicate block neither."""
     for name, text in (("design.yaml", DESIGN), ("balls.csv", BALLS), ("cut.yaml", CUT)):
