@@ -34,6 +34,14 @@ def test_a_guideway_is_turned_back_to_square(
     assert one.words == f"{turn} {'-' if cosine > 0 else '+'}{'XYZ'[other]}"
 
 
+def test_differences_of_scales_are_known_without_a_length() -> None:
+    values = 1e-6 * np.array([1.0, 3.0, 7.0, 0.0, 0.0, 0.0])
+    in_common = np.array([[1.0], [1.0], [1.0], [0.0], [0.0], [0.0]])
+    found = {one.name: one.value for one in adjustments(values, np.eye(6), in_common)}
+    assert np.isnan(found["scale x"])
+    assert [found[f"scale {axis} - scale x"] for axis in "yz"] == pytest.approx([2e-6, 6e-6])
+
+
 def test_a_tensor_that_gives_some_differences_no_length_is_no_metric() -> None:
     with pytest.raises(ValueError, match="no length"):
         parameters_of_metric(np.diag([1.0, 1.0, -1e-6]))

@@ -129,6 +129,10 @@ def test_a_design_without_a_certificate_is_told_where_its_scale_comes_from(tmp_p
         found.lengths.average if found.lengths else None
     )
     # Offsets off by u make a relative error of about u over their distances, here 100 mm.
+    loose = with_offsets(found.experiment, found.scale.loosened.offset_uncertainty)
+    u6 = predict(loose).quantities["U6"]
+    expected = pytest.approx((u6.average, u6.maximum))
+    assert (found.scale.loosened.average, found.scale.loosened.maximum) == expected
     assert found.scale.loosened.average > 5 * found.scale.loosened.before
 
 

@@ -115,7 +115,10 @@ def test_workflow_commands(folder: Path, capsys: pytest.CaptureFixture[str]) -> 
         assert source[int(number) - 2].strip().startswith("calibration:")
         told = f"{title.removeprefix('rank of ')}: rank deficiency 2, expected 1; "
         assert text.startswith(f"wrong.yaml:{number}:{column}: {told}")
-        assert "%0Aundetermined 2: " in text
+        assert [part[:14] for part in text.split("%0A")[1:3]] == [
+            "undetermined 1",
+            "undetermined 2",
+        ]
 
 
 def test_files_are_named_from_the_top_of_the_repository(

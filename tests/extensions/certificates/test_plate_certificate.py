@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from ballplate.extensions.certificates.certificate_page import certificate_page
 from ballplate.extensions.certificates.datum import chosen_datum
+from ballplate.presentation.formatting import number
 from ballplate.simulator.design.observations.coordinates import CoordinateCalibration
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.geometry.ball_layouts import BallLayout
@@ -163,6 +164,8 @@ def test_in_two_dimensions_it_says_what_fit_says() -> None:
     assert np.allclose(found.coordinates, plate.coordinates, rtol=0, atol=1e-15)
     expected = plate.standard_uncertainties
     assert np.allclose(found.standard_uncertainties, expected, rtol=1e-9, atol=1e-18)
+    largest = 1e6 * found.coverage_factor * expected.max()
+    assert f"U at most {number(largest, 3)} µm" in found.headline()
 
 
 @cache

@@ -60,6 +60,7 @@ def test_text(scales: Path, capsys: pytest.CaptureFixture[str]) -> None:
         "range in µm: X 4.000, Y 6.000, Z 36.00, resultant 36.72; largest resultant 36.72 µm at"
         " (400, " in out
     )
+    assert "; largest U of a co-ordinate 1.00 µm" in out
 
 
 def test_what_rounds_to_zero_has_no_sign(

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from ballplate.extensions.repair.candidates import along_rotation, candidates
+from ballplate.extensions.repair.candidates import along_rotation, candidates, further_readings
 from ballplate.extensions.repair.changes import Change, ChangeKind, changed, scale_readings
 from ballplate.extensions.repair.mending import mended
 from ballplate.extensions.repair.repair_search import loosened, repairs
@@ -401,6 +401,13 @@ def test_weak_directions(tmp_path: Path) -> None:
     found = repairs(experiment)
     assert found.repairs and not found.repairs[0].weak
     hold(plain(Path("designs/certified/weak.yaml"), None), experiment, found, tmp_path)
+
+
+def test_positions_read_twice_as_often() -> None:
+    (experiment,) = load(Path("designs/quickstart.yaml"))
+    twice = [one.item for one in further_readings(experiment) if "twice as often" in one.words]
+    assert [place.name for place in twice] == [place.name for place in experiment.positions]
+    assert {group.repeats for place in twice for group in place.readings} == {2}
 
 
 def test_what_a_plan_cannot_weigh_is_said(tmp_path: Path) -> None:

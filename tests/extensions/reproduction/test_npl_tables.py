@@ -108,7 +108,8 @@ def test_remarks_on_section_5(remark, shipped: Shipped) -> None:  # type: ignore
 
 @pytest.mark.parametrize("erratum", npl().errata, ids=lambda erratum: f"Table {erratum.table}")
 def test_errata(erratum, shipped: Shipped) -> None:  # type: ignore[no-untyped-def]
-    assert compare_erratum(npl(), shipped, erratum).agrees
+    found = compare_erratum(npl(), shipped, erratum)
+    assert found.agrees and found.computed < 1.0
     # The values are in the columns of the designs meant.
     table = erratum.figures_of or erratum.table
     assert set(erratum.meant) <= {c.design for c in npl().columns if c.table == table}

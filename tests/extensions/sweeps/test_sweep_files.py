@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from ballplate.extensions.sweeps.load import experiment_of, load_sweep
 from ballplate.extensions.sweeps.model import Sweep
+from ballplate.extensions.sweeps.values import subset_count
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 
@@ -119,7 +120,7 @@ def test_subsets_of_positions(written: Written) -> None:
             " among: [z low, z high, y low, y high, x high]}\n"
         )
     )
-    assert len(sweep.cells) == 10 + 1
+    assert len(sweep.cells) == 10 + 1 == subset_count(6, 1, (3, 6))
     assert [sweep.axes[0].choices[k].label for k in (0, 10)] == ["z low + z high + x low", "all"]
     assert [one.name for one in experiment_of(sweep, 0).positions] == ["z low", "z high", "x low"]
     assert len(experiment_of(sweep, 10).positions) == 6
