@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import re
@@ -13,11 +14,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.cli import GROUPS, commands_of_all, main
+from ballplate.planning.criteria import NAMES as CRITERIA
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.machines.truth import true_parameters
 
 from tests.cli import wording
+from tests.reference.small_plate import PLATE
 
 QUICKSTART = "designs/quickstart.yaml"
 SYMBOLS = ("U1", "U2", "U3", "U4", "U5", "U6")
@@ -364,3 +367,17 @@ def test_help_lists_all_commands_in_groups(capsys: pytest.CaptureFixture[str]) -
     listed = [name for names in of_group.values() for name in names]
     assert sorted(listed) == sorted(name for name in commands_of_all() if " " not in name)
     assert len(listed) - len(of_group["more"]) <= 20
+
+
+def test_fit_reads_the_tables_that_the_file_names(tmp_path: Path) -> None:
+    path = tmp_path / "plate.yaml"
+    path.write_text(PLATE + "readings: {files: r.csv}\n", encoding="utf-8")
+    assert run("simulate", path, "-o", tmp_path / "r.csv") == 0
+    assert run("fit", path) == 0
+
+
+def test_help_lists_each_criterion_of_plans(capsys: pytest.CaptureFixture[str]) -> None:
+    with contextlib.suppress(SystemExit):
+        run("plan", "--help")
+    out = " ".join(capsys.readouterr().out.split())
+    assert f"{', '.join(CRITERIA[1:-1])} or {CRITERIA[-1]}" in out

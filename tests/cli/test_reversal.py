@@ -151,6 +151,8 @@ def test_too_far_from_a_quarter_turn(
         for name in ("offset x", "offset y")
     )
     assert found["neglected_offset"] == pytest.approx(shift, rel=0.01)
+    (shown,) = re.findall(r"and offsets by up to ([\d.]+) (mm|µm)", err)
+    assert float(shown[0]) * {"mm": 1e-3, "µm": 1e-6}[shown[1]] == pytest.approx(shift, rel=0.1)
     # No result is off by more standard uncertainties than told.
     for name, estimate in found["estimates"].items():
         beside = full["relation"][name]

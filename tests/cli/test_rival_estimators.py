@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -75,6 +76,10 @@ def test_compare(capsys: pytest.CaptureFixture[str]) -> None:
     assert (
         found["trials"] == 4 and found["not_converged"] == [] and len(found["rms"]["values"]) == 4
     )
+    row = np.array(re.findall(r"\nroot mean square +(.*)", out)[0].split(), float)
+    shares = [0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0]
+    expected = 1e6 * np.quantile(found["rms"]["values"], shares)
+    assert row == pytest.approx(expected, rel=0.01)
     # More data sets add to those before.
     assert main([*COMPARED[:-1], "2", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["rms"]["values"] == found["rms"]["values"][:2]

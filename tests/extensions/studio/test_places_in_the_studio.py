@@ -86,6 +86,14 @@ def test_turned_standing_copied_and_added_plates_are_where_they_are_drawn(
             assert drawn[place] == pytest.approx(origin, abs=1e-9)
 
 
+def test_what_is_put_without_a_place_is_far_from_the_others(document: DesignDocument) -> None:
+    text = document.text
+    begin = text.index("  - {name: z high")
+    one = done(document, {"do": "text", "text": text[:begin] + text[text.index("calibration:") :]})
+    first, second = origins(experiment_of(done(one, {"do": "put"}))).values()
+    assert np.abs(np.subtract(first, second)).max() > 0.2
+
+
 def test_a_typed_place_is_kept(document: DesignDocument) -> None:
     path = ["positions", 1, "corner", "x"]
     typed = done(document, {"do": "set", "path": path, "value": "middle"})
