@@ -80,6 +80,7 @@ def test_compare(capsys: pytest.CaptureFixture[str]) -> None:
     shares = [0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0]
     expected = 1e6 * np.quantile(found["rms"]["values"], shares)
     assert row == pytest.approx(expected, rel=0.01)
+    assert [float(share) for share in found["rms"]["quantiles"]] == shares
     # More data sets add to those before.
     assert main([*COMPARED[:-1], "2", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["rms"]["values"] == found["rms"]["values"][:2]

@@ -16,6 +16,7 @@ from ballplate.cli import main
 from ballplate.extensions.maps.length_map import length_map
 from ballplate.extensions.pages.design_contents import page_of_design
 
+from tests.extensions.certificates.campaigns import IN_SPACE
 from tests.extensions.pages import wording
 from tests.extensions.pages.pages_read import ResultPage, assert_quoted
 
@@ -94,6 +95,17 @@ def test_a_page_in_two_dimensions_has_plates_and_no_curves() -> None:
     page = fit.page()
     assert_quoted(page, {"fit": fit.to_dict(), "reliability": bp.reliability(experiment).to_dict()})
     assert 'id="plate"' in page and 'id="curves"' not in page
+
+
+def test_adjustments_are_shown_in_seconds_of_arc_and_parts_per_million() -> None:
+    experiment = bp.experiment({**IN_SPACE, "error_model": {"kind": "metric"}})
+    fit = bp.fit(experiment, bp.simulate(experiment, seed=1))
+    cells = [text for _, text in ResultPage(fit.page()).cells]
+    assert len(fit.adjustments) == 6
+    for one in fit.adjustments:
+        factor = 180 * 3600 / np.pi if one.unit == "rad" else 1e6
+        shown = float(cells[cells.index(one.what) + 1].replace("\N{MINUS SIGN}", "-"))
+        assert shown == pytest.approx(factor * one.value, rel=0.01)
 
 
 @pytest.mark.parametrize("variant", ["deficient", "no target", "k = 2", "plane"])
