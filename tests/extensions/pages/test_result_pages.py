@@ -100,12 +100,12 @@ def test_a_page_in_two_dimensions_has_plates_and_no_curves() -> None:
 def test_adjustments_are_shown_in_seconds_of_arc_and_parts_per_million() -> None:
     experiment = bp.experiment({**IN_SPACE, "error_model": {"kind": "metric"}})
     fit = bp.fit(experiment, bp.simulate(experiment, seed=1))
-    cells = [text for _, text in ResultPage(fit.page()).cells]
+    shown = {one.attributes["data-path"]: one.text for one in ResultPage(fit.page()).shown}
     assert len(fit.adjustments) == 6
     for one in fit.adjustments:
         factor = 180 * 3600 / np.pi if one.unit == "rad" else 1e6
-        shown = float(cells[cells.index(one.what) + 1].replace("\N{MINUS SIGN}", "-"))
-        assert shown == pytest.approx(factor * one.value, rel=0.01)
+        figure = float(shown[f"/fit/adjustments/{one.name}/value"].replace("\N{MINUS SIGN}", "-"))
+        assert figure == pytest.approx(factor * one.value, rel=0.01)
 
 
 @pytest.mark.parametrize("variant", ["deficient", "no target", "k = 2", "plane"])
