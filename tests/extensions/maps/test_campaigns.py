@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
-from ballplate.extensions.maps.campaign_tests import EstimatedSigma
+from ballplate.extensions.maps.campaign_tests import EstimatedSigma, with_common
 from ballplate.extensions.maps.compared_maps import MappedValues, map_of_fit
 from ballplate.extensions.maps.comparison import MapComparison, compared
 from ballplate.extensions.maps.normalised_errors import ValueDifference
@@ -64,6 +66,14 @@ def assert_joint_tests_are_right(comparisons: Sequence[MapComparison]) -> None:
         dimensions = sum(test.dimensions for test in tests if test is not None)
         assert dimensions == number * len(comparisons)
         assert 1e-4 < chi2.cdf(total, dimensions) < 1.0 - 1e-4
+
+
+def test_either_campaign_has_half_of_the_variance_in_common() -> None:
+    common, none = np.array([[1.0], [2.0]]), np.zeros((2, 1))
+    scatters: Any = [SimpleNamespace(sigma=sigma) for sigma in (1.0, 3.0)]
+    for root, scatter in zip(with_common((none, none), common, scatters), scatters, strict=True):
+        variance = (root**2).sum(axis=1)
+        assert variance == pytest.approx(0.5 * scatter.sigma**2 * common[:, 0] ** 2)
 
 
 def test_a_machine_does_not_differ_from_itself() -> None:
