@@ -14,32 +14,16 @@ from http.cookiejar import CookieJar
 from pathlib import Path
 
 import pytest
-from ballplate.designs import shipped
 
 pytest.importorskip("starlette", reason="the studio is an extra")
 
 from ballplate.extensions.studio.recovery import kept_in
-from ballplate.extensions.studio.session import RefusedError, Session
+from ballplate.extensions.studio.session import RefusedError
 
 from tests.extensions.studio.test_recovery import MODEL, in_python
 
 POINTS = "points: {random: 200, seed: 1}"
 SLOW = "points: {random: 20000, seed: 1}"
-
-
-@pytest.fixture
-def design(tmp_path: Path) -> Path:
-    path = tmp_path / "plate.yaml"
-    path.write_bytes(Path(shipped("quickstart.yaml")).read_bytes())
-    return path
-
-
-@pytest.fixture
-def session(design):
-    found = Session(design)
-    found.state()
-    yield found
-    found.close()
 
 
 def kept_text(design: Path) -> str:
