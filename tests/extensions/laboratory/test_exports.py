@@ -160,6 +160,15 @@ def test_a_file_for_each_position(tmp_path: Path) -> None:
     assert_all_planned(found, 1e-9)
 
 
+def test_stated_probes_stay_where_another_file_has_no_column_of_probes(tmp_path: Path) -> None:
+    single = [[*row[:2], *row[3:]] for row in READINGS if row[0] == "z low"]
+    others = [row for row in READINGS if row[0] != "z low"]
+    paths = [tmp_path / "single.csv", tmp_path / "others.csv"]
+    paths[0].write_text(lines(["position", "ball", *AXES], *single), encoding="utf-8")
+    paths[1].write_text(lines(PLAIN, *others), encoding="utf-8")
+    assert_all_planned(observed(paths), 1e-9)
+
+
 def test_missing_balls(tmp_path: Path) -> None:
     """Balls that were not read have rows without co-ordinates."""
     table = commas(READINGS)
