@@ -65,7 +65,6 @@ NO_NAMES_OF_THE_EXPERIMENT = (
     "x low and 3 more, its balls r1c1, r1c2, r1c3 and 22 more; state the rule with "
     "--name, such as {position}_{ball}"
 )
-NO_NAMES_OF_THE_EXPERIMENT_2 = "no names of the experiment in r1c1"
 NO_POINTS_WITH_THE_ID = 'no points with the id "13" in clear'
 NO_POSITION_OR_PROBE = (
     'merged-en.csv:3:1: no "Position" or "Probe" in line 3 and 83 more; if it is the name above, as'
@@ -101,9 +100,6 @@ STATE_THE_RULE_WITH_NAME = "state the rule with --name"
 SWAP_THE_NAMES_OF_THE_BALLS = "swap the names of the balls in lines 54 and 55"
 TABLE_OF_THE_NOMINAL_CENTRES = "table of the nominal centres of balls"
 THERE_IS_NO_COLUMN = 'there is no column "F"'
-THE_CONTROL_CHARACTER_IS_NO_PART = (
-    "report:2:1: the control character U+0007 is not allowed in a text"
-)
 THE_DEVIATION_IS_NOT_MEASURED_MINUS = (
     "report:14:1: X: the deviation is not measured minus nominal; is the line damaged?"
 )
