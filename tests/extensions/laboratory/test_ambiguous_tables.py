@@ -4,51 +4,26 @@ meaning.
 
 from __future__ import annotations
 
-from functools import cache
 from pathlib import Path
 
 import pytest
 from ballplate.extensions.laboratory.any_table import TableRows
-from ballplate.extensions.laboratory.reading_tables import any_table_rows
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.loading import load
-from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.yamltree import GivenText
-from ballplate.simulator.readings.reading_sources import source_text
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from tests.extensions.laboratory import wording
+from tests.extensions.laboratory.tables import rows_of
 
-DESIGN = Path("designs/quickstart.yaml")
 HEAD = "position;ball;probe;x_mm;y_mm;z_mm\n"
 
 
-@cache
-def quickstart() -> tuple[Experiment, Design]:
-    (found,) = load(DESIGN)
-    return found, lay_out(found)
-
-
 def read(text: str | bytes, path: Path | None = None, **said: object) -> TableRows:
-    """The rows of a table, without a look at its names."""
-    experiment, design = quickstart()
-    names = {
-        "position": design.positions.names,
-        "ball": design.balls.names,
-        "probe": design.probes.names,
-    }
-    if path is not None:
-        path.write_bytes(text if isinstance(text, bytes) else text.encode())
-    source = GivenText("t.csv", str(text)) if path is None else path
-    stated = experiment.with_readings(said).readings
-    wrong: list[object] = []
-    found = any_table_rows(source_text(source, stated.encoding), names, stated, wrong, 3, {})  # type: ignore[arg-type]
-    if wrong:
-        raise ExperimentError(wrong)  # type: ignore[arg-type]
-    return found
+    if path is None:
+        return rows_of(GivenText("t.csv", str(text)), **said)
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return rows_of(path, **said)
 
 
 def numbers(found: TableRows) -> list[float]:
