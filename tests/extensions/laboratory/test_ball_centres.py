@@ -111,17 +111,9 @@ def test_a_correction_is_taken_off(
         assert any(wording.THE_ERRORS_THAT_IT_LEAVES in text for text in on.remarks)
 
 
-def test_readers_agree_on_several_tables(
-    readings: pandas.DataFrame, plain: pandas.DataFrame, tmp_path: Path
-) -> None:
-    """Data frames, and files that the experiment names, are the same readings."""
-    halves = [readings.iloc[:100], readings.iloc[100:]]
-    paths = [tmp_path / "a.csv", tmp_path / "b.csv"]
-    for half, path in zip(halves, paths, strict=True):
-        half.to_csv(path, index=False)
-    named = bp.load(DESIGN).with_(readings={"files": [str(path) for path in paths]})
-    for found in (bp.fit(DESIGN, halves), bp.fit(named)):
-        assert pandas.DataFrame(found.rows()).equals(plain)
+def test_several_data_frames_are_one(readings: pandas.DataFrame, plain: pandas.DataFrame) -> None:
+    found = bp.fit(DESIGN, [readings.iloc[:100], readings.iloc[100:]])
+    assert pandas.DataFrame(found.rows()).equals(plain)
 
 
 @pytest.mark.parametrize("count", [1, 2])
