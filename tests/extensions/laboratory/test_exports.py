@@ -31,13 +31,6 @@ def commas(rows: Rows) -> Rows:
     return [[*row[:3], *(cell.replace(".", ",") for cell in row[3:])] for row in rows]
 
 
-def semicolons(rows: Rows) -> bytes:
-    head = "Prüfbericht;Kugelplatte\nDatum;22.11.2026\n\n"
-    names = ["Lage", "Kugel", "Taster", "X [mm]", "Y [mm]", "Z [mm]", "Form"]
-    table = [[*row, "0,0012"] for row in commas(rows)]
-    return (head + lines(names, *table) + "\n\nEnde des Berichts\n").encode("cp1252")
-
-
 def unit_below(rows: Rows) -> bytes:
     """With a line of units below the headings, shuffled."""
     order = np.random.default_rng(2).permutation(len(rows))
@@ -50,12 +43,6 @@ def micrometres(rows: Rows) -> bytes:
     table = [[*row[:3], *(f"{1e3 * float(cell):.3f}" for cell in row[3:])] for row in rows]
     names = ["position", "ball", "probe", "x (µm)", "y (µm)", "z (µm)"]
     return lines(names, *table, separator=" | ").encode("latin-1")
-
-
-def inches(rows: Rows) -> bytes:
-    table = [[*row[:3], *(repr(float(cell) / 25.4) for cell in row[3:])] for row in rows]
-    names = ["position", "ball", "probe", "x in", "y in", "z in"]
-    return lines(names, *table, separator=",").encode()
 
 
 def other_order(rows: Rows) -> bytes:
@@ -106,10 +93,8 @@ def elsewhere(rows: Rows) -> bytes:
 
 
 EXPORTS: dict[str, tuple[Callable[[Rows], bytes], str]] = {
-    "semicolons": (semicolons, "semicolons, decimal commas, cp1252, header in line 4, mm"),
     "unit below": (unit_below, "semicolons, decimal commas, UTF-8, header in line 1, mm"),
     "micrometres": (micrometres, "bars, decimal points, cp1252, header in line 1, um"),
-    "inches": (inches, "commas, decimal points, UTF-8, header in line 1, in"),
     "other order": (other_order, 'not used: "X nominal", "dX"'),
     "blanks": (blanks, "read as: blanks, decimal points"),
     "aligned": (aligned, "read as: two or more blanks"),

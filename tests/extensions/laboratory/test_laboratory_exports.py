@@ -104,11 +104,6 @@ def test_an_export_fits_after_the_answer_to_one_question(
     assert found == expected, err
 
 
-def test_every_export_is_tried() -> None:
-    names = {path.name for path in FOLDER.iterdir()} - {PLATE.name, PLAIN.name}
-    assert {*AT_ONCE, *AFTER_A_QUESTION} == names | {WORKBOOK}
-
-
 def test_sheets_with_tables_are_asked_for(
     expected: object, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
