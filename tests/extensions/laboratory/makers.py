@@ -24,13 +24,12 @@ class Ball:
         return tuple(round(value, 0) for value in self.centre)
 
 
-def dmis(balls: Sequence[Ball], unit: str = "MM", factor: str = "1", more: str = "") -> str:
+def dmis(balls: Sequence[Ball], unit: str = "MM", factor: str = "1") -> str:
     """DMIS output, with a plane and a tolerance among the spheres."""
     lines = [
         "DMISMN/'BALL PLATE',05.2", "FILNAM/'PLATE',05.2", "$$ written for a test",
         f"UNITS/{unit},ANGDEC", "D(0)=DATSET/MCS",
         "F(TOP)=FEAT/PLANE,CART,0,0,0,0,0,1", "FA(TOP)=FEAT/PLANE,CART,0,0,0.0011,0,0,1",
-        *more.splitlines(),
     ]  # fmt: skip
     sensor = None
     for ball in balls:

@@ -8,8 +8,12 @@ from typing import Any
 
 import ballplate as bp
 import numpy as np
+from ballplate.extensions.laboratory.any_table import TableRows
+from ballplate.extensions.laboratory.reading_tables import any_table_rows
 from ballplate.simulator.experiment import lay_out
+from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.readings import read_readings
+from ballplate.simulator.readings.reading_sources import Source, source_text
 
 QUICKSTART = bp.quickstart()
 DESIGN = lay_out(QUICKSTART)
@@ -26,6 +30,20 @@ def observed(paths: Path | Sequence[Path], **stated: object) -> Any:
 def of_table(folder: Path, text: str | bytes, name: str = "lab.csv", **stated: object) -> Any:
     (folder / name).write_bytes(text.encode() if isinstance(text, str) else text)
     return observed(folder / name, **stated)
+
+
+def rows_of(source: Source, **stated: object) -> TableRows:
+    """The rows of a table, without a look at its names."""
+    settings, wrong = QUICKSTART.with_readings(stated).readings, list[Message]()
+    names = {
+        "position": DESIGN.positions.names,
+        "ball": DESIGN.balls.names,
+        "probe": DESIGN.probes.names,
+    }
+    found = any_table_rows(source_text(source, settings.encoding), names, settings, wrong, 3, {})
+    if wrong:
+        raise ExperimentError(wrong)
+    return found
 
 
 def names_read(found: Any) -> list[tuple[str, str, str]]:

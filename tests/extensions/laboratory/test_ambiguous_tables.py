@@ -4,51 +4,26 @@ meaning.
 
 from __future__ import annotations
 
-from functools import cache
 from pathlib import Path
 
 import pytest
 from ballplate.extensions.laboratory.any_table import TableRows
-from ballplate.extensions.laboratory.reading_tables import any_table_rows
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.loading import load
-from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.yamltree import GivenText
-from ballplate.simulator.readings.reading_sources import source_text
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from tests.extensions.laboratory import wording
+from tests.extensions.laboratory.tables import rows_of
 
-DESIGN = Path("designs/quickstart.yaml")
 HEAD = "position;ball;probe;x_mm;y_mm;z_mm\n"
 
 
-@cache
-def quickstart() -> tuple[Experiment, Design]:
-    (found,) = load(DESIGN)
-    return found, lay_out(found)
-
-
 def read(text: str | bytes, path: Path | None = None, **said: object) -> TableRows:
-    """The rows of a table, without a look at its names."""
-    experiment, design = quickstart()
-    names = {
-        "position": design.positions.names,
-        "ball": design.balls.names,
-        "probe": design.probes.names,
-    }
-    if path is not None:
-        path.write_bytes(text if isinstance(text, bytes) else text.encode())
-    source = GivenText("t.csv", str(text)) if path is None else path
-    stated = experiment.with_readings(said).readings
-    wrong: list[object] = []
-    found = any_table_rows(source_text(source, stated.encoding), names, stated, wrong, 3, {})  # type: ignore[arg-type]
-    if wrong:
-        raise ExperimentError(wrong)  # type: ignore[arg-type]
-    return found
+    if path is None:
+        return rows_of(GivenText("t.csv", str(text)), **said)
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return rows_of(path, **said)
 
 
 def numbers(found: TableRows) -> list[float]:
@@ -68,30 +43,19 @@ def test_signs_between_thousands_of_two_kinds_are_refused_in_words(cell: str) ->
 
 
 @pytest.mark.parametrize(
-    "cell", ["1.012,5", "1 012,5", "1\u00a0012,5", "1\u202f012,5", "1'012,5", "1\u2019012,5"]
+    "cell",
+    ["1.012,5", "1 012,5", "1\u00a0012,5", "1\u202f012,5", "1'012,5", "1\u2019012,5"]
+    + ["1,012.5", "1'012.5"],
 )
 def test_signs_between_thousands_are_read(cell: str) -> None:
-    text = HEAD + f"z low;r1c1;down;{cell};100,2;250\nz low;r1c2;down;5,25;100,2;250\n"
+    sign = cell[-2]
+    text = HEAD + f"z low;r1c1;down;{cell};100{sign}2;250\nz low;r1c2;down;5{sign}25;-{cell};250\n"
     found = read(text)
-    assert numbers(found) == [1012.5, 100.2, 250.0, 5.25, 100.2, 250.0]
+    assert numbers(found) == [1012.5, 100.2, 250.0, 5.25, -1012.5, 250.0]
     assert "between thousands" in found.told[0]
     # All of a column have them, or none.
-    mixed = asked(text.replace("5,25", "1125,5"))
+    mixed = asked(text.replace(f"5{sign}25", f"1125{sign}5"))
     assert f'"{" ".join(cell.split())}" {wording.HAS_SIGNS_BETWEEN_THOUSANDS}' in mixed
-
-
-@pytest.mark.parametrize("signs", [".,", ",.", "',", "'."])
-def test_thousands_and_decimals_of_any_signs(signs: str) -> None:
-    rows = [("-0.1", "100.25", "1012.5"), ("1000.5", "0.5", "-1012.5"), ("3.25", "1100.0", "7.5")]
-    text = HEAD
-    for k, row in enumerate(rows, start=1):
-        cells = [
-            f"{float(cell):,}".translate(str.maketrans({",": signs[0], ".": signs[1]}))
-            for cell in row
-        ]
-        text += f"z low;r1c{k};down;{';'.join(cells)}\n"
-    found = read(text)
-    assert numbers(found) == [float(cell) for row in rows for cell in row]
 
 
 def test_two_kinds_of_decimals() -> None:
@@ -168,7 +132,6 @@ def test_rows_that_were_cut_off() -> None:
     ("content", "told"),
     [
         (b"PK\x03\x04\x14\x00", "is a workbook"),
-        (b"\x00\x01\x02\x03", "the control character"),
         (b"\x00a\x01", "control character U+0000"),
         ((HEAD + "z low;r1c1;down;\x07;1;2\n").encode(), "the control character"),
         (HEAD.encode(), "no rows below"),

@@ -63,13 +63,6 @@ def worst(found: bp.Fit, plain: pandas.DataFrame) -> tuple[float, float]:
     return float(apart[of_machine].max()), float(np.abs(balls[0] - balls[1]).max())
 
 
-def test_stated_ball_centres_give_the_estimates_of_scale_readings(
-    readings: pandas.DataFrame, plain: pandas.DataFrame
-) -> None:
-    machine, balls = worst(bp.fit(DESIGN, centres(readings), coordinates="ball centres"), plain)
-    assert machine < 1e-5 and balls < 1e-11
-
-
 def test_offsets_of_the_controller(readings: pandas.DataFrame, plain: pandas.DataFrame) -> None:
     """The measuring program's offsets are not those of the plan: only they were applied."""
     others = {name: tuple(1.01 * x + 0.2 for x in offset) for name, offset in OFFSETS.items()}
@@ -79,16 +72,6 @@ def test_offsets_of_the_controller(readings: pandas.DataFrame, plain: pandas.Dat
     )
     machine, balls = worst(bp.fit(experiment, centres(readings, others)), plain)
     assert machine < 1e-5 and balls < 1e-11
-
-
-def test_part_co_ordinates_give_the_same_machine(
-    readings: pandas.DataFrame, plain: pandas.DataFrame
-) -> None:
-    """To 0.05 standard uncertainties, where the plate stood as planned."""
-    found = bp.fit(DESIGN, in_parts(centres(readings), 6), coordinates="part")
-    machine, balls = worst(found, plain)
-    assert machine < 0.05 and balls < 1e-9
-    assert any(wording.PLACED_BY_THE_NOMINAL_POSES in text for text in found.remarks)
 
 
 # Errors that the machine's correction takes off: e(x) of x + e(x).
@@ -128,17 +111,9 @@ def test_a_correction_is_taken_off(
         assert any(wording.THE_ERRORS_THAT_IT_LEAVES in text for text in on.remarks)
 
 
-def test_readers_agree_on_several_tables(
-    readings: pandas.DataFrame, plain: pandas.DataFrame, tmp_path: Path
-) -> None:
-    """Data frames, and files that the experiment names, are the same readings."""
-    halves = [readings.iloc[:100], readings.iloc[100:]]
-    paths = [tmp_path / "a.csv", tmp_path / "b.csv"]
-    for half, path in zip(halves, paths, strict=True):
-        half.to_csv(path, index=False)
-    named = bp.load(DESIGN).with_(readings={"files": [str(path) for path in paths]})
-    for found in (bp.fit(DESIGN, halves), bp.fit(named)):
-        assert pandas.DataFrame(found.rows()).equals(plain)
+def test_several_data_frames_are_one(readings: pandas.DataFrame, plain: pandas.DataFrame) -> None:
+    found = bp.fit(DESIGN, [readings.iloc[:100], readings.iloc[100:]])
+    assert pandas.DataFrame(found.rows()).equals(plain)
 
 
 @pytest.mark.parametrize("count", [1, 2])

@@ -31,13 +31,6 @@ def commas(rows: Rows) -> Rows:
     return [[*row[:3], *(cell.replace(".", ",") for cell in row[3:])] for row in rows]
 
 
-def semicolons(rows: Rows) -> bytes:
-    head = "Prüfbericht;Kugelplatte\nDatum;22.11.2026\n\n"
-    names = ["Lage", "Kugel", "Taster", "X [mm]", "Y [mm]", "Z [mm]", "Form"]
-    table = [[*row, "0,0012"] for row in commas(rows)]
-    return (head + lines(names, *table) + "\n\nEnde des Berichts\n").encode("cp1252")
-
-
 def unit_below(rows: Rows) -> bytes:
     """With a line of units below the headings, shuffled."""
     order = np.random.default_rng(2).permutation(len(rows))
@@ -50,12 +43,6 @@ def micrometres(rows: Rows) -> bytes:
     table = [[*row[:3], *(f"{1e3 * float(cell):.3f}" for cell in row[3:])] for row in rows]
     names = ["position", "ball", "probe", "x (µm)", "y (µm)", "z (µm)"]
     return lines(names, *table, separator=" | ").encode("latin-1")
-
-
-def inches(rows: Rows) -> bytes:
-    table = [[*row[:3], *(repr(float(cell) / 25.4) for cell in row[3:])] for row in rows]
-    names = ["position", "ball", "probe", "x in", "y in", "z in"]
-    return lines(names, *table, separator=",").encode()
 
 
 def other_order(rows: Rows) -> bytes:
@@ -106,10 +93,8 @@ def elsewhere(rows: Rows) -> bytes:
 
 
 EXPORTS: dict[str, tuple[Callable[[Rows], bytes], str]] = {
-    "semicolons": (semicolons, "semicolons, decimal commas, cp1252, header in line 4, mm"),
     "unit below": (unit_below, "semicolons, decimal commas, UTF-8, header in line 1, mm"),
     "micrometres": (micrometres, "bars, decimal points, cp1252, header in line 1, um"),
-    "inches": (inches, "commas, decimal points, UTF-8, header in line 1, in"),
     "other order": (other_order, 'not used: "X nominal", "dX"'),
     "blanks": (blanks, "read as: blanks, decimal points"),
     "aligned": (aligned, "read as: two or more blanks"),
@@ -158,6 +143,15 @@ def test_a_file_for_each_position(tmp_path: Path) -> None:
     assert wording.POSITION_BY_THE_NAME in told and wording.POSITION_ABOVE_THE_HEADINGS in told
     assert wording.POSITIONS_MATCHED_BY_NAME_BUT in told and "Z_HIGH = z high" in told
     assert_all_planned(found, 1e-9)
+
+
+def test_stated_probes_stay_where_another_file_has_no_column_of_probes(tmp_path: Path) -> None:
+    single = [[*row[:2], *row[3:]] for row in READINGS if row[0] == "z low"]
+    others = [row for row in READINGS if row[0] != "z low"]
+    paths = [tmp_path / "single.csv", tmp_path / "others.csv"]
+    paths[0].write_text(lines(["position", "ball", *AXES], *single), encoding="utf-8")
+    paths[1].write_text(lines(PLAIN, *others), encoding="utf-8")
+    assert_all_planned(observed(paths), 1e-9)
 
 
 def test_missing_balls(tmp_path: Path) -> None:

@@ -26,6 +26,10 @@ ROLES = ["position", "ball", "probe", "unit", *FURTHER]
         "Läge;Kula;Mätspets;Enhet;Tid;Temperatur platta (°C);Temperatur skalor (°C)",
         "Pose;Sphère;Palpeur;Unité;Heure;Température plaque (°C);Température règles (°C)",
         "Posizione;Sfera;Tastatore;Unità;Ora;Temperatura piastra [°C];Temperatura righe [°C]",
+        *(
+            f"{head};Kugel;Taster;Einheit;Uhrzeit;Temperatur Platte [°C];Temperatur Maßstab [°C]"
+            for head in ("Messlage", "AUFSPANNUNG", "Stellung Nr.")
+        ),
         "Posición;Esfera;Palpador;Unidad;Hora;Temperatura placa [°C];Temperatura reglas [°C]",
     ],
 )

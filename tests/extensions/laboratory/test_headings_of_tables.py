@@ -1,46 +1,27 @@
-"""Headings of tables of readings: other words for positions, columns that are not used, and
-headings that occur twice.
-"""
+"""Headings of tables of readings: columns that are not used, and headings that occur twice."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-import ballplate as bp
 import numpy as np
 import pandas
 import pytest
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.yamltree import GivenText
-from ballplate.simulator.readings.reading_files import ObservedReadings, read_readings
+from ballplate.simulator.readings.reading_files import read_readings
 
 from tests.extensions.laboratory import wording
-
-EXPERIMENT = bp.quickstart()
-DESIGN = lay_out(EXPERIMENT)
-AXES = ["x_mm", "y_mm", "z_mm"]
-
-
-def read(table: pandas.DataFrame, heads: list[str], path: Path) -> ObservedReadings:
-    """Readings of a table written under other headings."""
-    path.write_text(",".join(heads) + "\n" + table.to_csv(index=False, header=False))
-    return read_readings(path, DESIGN, settings=EXPERIMENT.readings)
+from tests.extensions.laboratory.tables import QUICKSTART, observed
 
 
 def refusal(table: pandas.DataFrame, heads: list[str], path: Path) -> str:
+    """That of a table written under other headings."""
+    path.write_text(",".join(heads) + "\n" + table.to_csv(index=False, header=False))
     with pytest.raises(ExperimentError) as refused:
-        read(table, heads, path)
+        observed(path)
     return str(refused.value)
-
-
-@pytest.mark.parametrize("head", ["Messlage", "AUFSPANNUNG", "Stellung Nr."])
-def test_other_words_for_positions(readings: pandas.DataFrame, tmp_path: Path, head: str) -> None:
-    heads = [head, "Kugel", "Taster", "X [mm]", "Y [mm]", "Z [mm]"]
-    found = read(readings, heads, tmp_path / "t.csv")
-    names = [found.design.positions.names[k] for k in found.design.readings.position]
-    assert names == list(readings["position"])
-    assert np.allclose(found.x, 1e-3 * readings[AXES].to_numpy(), rtol=0, atol=1e-12)
 
 
 def test_columns_that_are_not_used_are_told_where_the_name_of_the_file_is_no_position(
@@ -64,7 +45,7 @@ def test_a_file_named_as_a_position_has_that_position(
         heads = "Ort,Kugel,Taster,X [mm],Y [mm],Z [mm]\n"
         other = own.assign(position="z low")
         paths[-1].write_text(heads + other.to_csv(index=False, header=False))
-    found = read_readings(paths, DESIGN, settings=EXPERIMENT.readings)
+    found = observed(paths)
     assert len(found.x) == len(readings) and not found.missing
     assert all('not used: "Ort"' in told for told in found.table_notes)
 
@@ -89,7 +70,7 @@ def test_columns_that_influences_ask_for_are_read_in_any_table(
         "artefact_expansion": {"value": "11.5 um/m/K", "standard_uncertainty": "1 um/m/K"},
         "artefact_temperature": {"value": "20 degC", "standard_uncertainty": "0.1 K"},
     }
-    design = lay_out(EXPERIMENT.with_(influences=[influence]))
+    design = lay_out(QUICKSTART.with_(influences=[influence]))
     warm = 20.0 + 0.01 * np.arange(len(readings))
     plain = readings.assign(temperature_artefact_degC=warm).to_csv(index=False)
     other = readings.rename(columns={"ball": "Kugel", "x_mm": "X [mm]", "y_mm": "Y [mm]"})

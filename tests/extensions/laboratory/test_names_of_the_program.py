@@ -4,6 +4,7 @@ one column of a table.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from decimal import Decimal
 from pathlib import Path
@@ -12,6 +13,7 @@ from typing import Any
 import ballplate as bp
 import numpy as np
 import pytest
+from ballplate.cli import main
 from ballplate.extensions.laboratory.feature_names import named
 from ballplate.simulator.experiment.name_rules import check_rule
 from ballplate.simulator.inputs.messages import ExperimentError
@@ -87,6 +89,22 @@ def test_probes_of_reports_have_the_names_of_the_program(tmp_path: Path, form: s
         tips = [f"TIP/{ball.sensor}, SHANKIJK=0, 0, 1\nDIM LOC" for ball in balls]
         text = pieces[0] + "".join(a + b for a, b in zip(tips, pieces[1:], strict=True))
     assert_all_planned(of_table(tmp_path, text, "report.txt", probes=TIPS), 1e-9)
+
+
+def test_a_report_of_the_program_of_points_has_the_planned_readings(tmp_path: Path) -> None:
+    program, report = tmp_path / "plate.dmi", tmp_path / "plate.dmo"
+    given = ["--points", str(program), "--ball-diameter", "22 mm"]
+    assert main(["sheet", "designs/quickstart.yaml", *given]) == 0
+    kept = [
+        re.sub(r"^F\(", "FA(", line)
+        for line in program.read_text(encoding="utf-8").splitlines()
+        if not line.startswith(("MEAS", "PTMEAS", "ENDMES", "MODE"))
+    ]
+    report.write_text("\n".join([*kept, ""]), encoding="utf-8")
+    found = bp.read_report(report, QUICKSTART)
+    names = found.to_frame()[["position", "ball", "probe"]].itertuples(index=False, name=None)
+    assert sorted(names) == sorted(row[:3] for row in ROWS)
+    assert "coordinates: ball centres" in found.key
 
 
 def test_a_probe_that_the_experiment_lacks_is_refused() -> None:

@@ -6,10 +6,6 @@ from pathlib import Path
 
 import pytest
 from ballplate.cli import main
-from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.loading import load
-from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.readings.reading_files import read_readings
 
 from tests.extensions.laboratory import wording
 
@@ -84,5 +80,3 @@ def test_a_file_that_is_named_twice(capsys: pytest.CaptureFixture[str], tmp_path
         text = refusal(capsys, readings, other)
         assert wording.THE_FILE_IS_NAMED_TWICE in text and len(text.splitlines()) == 1
         assert ("as well" in text) == (other != readings)
-    with pytest.raises(ExperimentError, match="named twice"):
-        read_readings([readings, readings], lay_out(load(Path(DESIGN))[0]))

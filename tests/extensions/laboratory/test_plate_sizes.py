@@ -55,7 +55,6 @@ def read(folder: Path, true: dict[str, Any]) -> Any:
 PITCH, OTHER = "is `size` the pitch? Correct artefacts.plate", "is its size right?"
 SIZES: dict[str, Any] = {
     "pitch": ((3, 3), (200, 200), (100, 100), "2.00 times as large", PITCH),
-    "pitch of five": ((5, 5), (400, 400), (100, 100), "4.00 times as large", PITCH),
     "pitch of four by three": (
         (4, 3),
         (300, 200),
@@ -64,7 +63,6 @@ SIZES: dict[str, Any] = {
         PITCH,
     ),
     "smaller": ((4, 4), (150, 150), (300, 300), "0.500 times as large", OTHER),
-    "half as large again": ((3, 4), (300, 300), (200, 200), "1.50 times as large", OTHER),
     "one side": (
         (3, 3),
         (300, 300),
@@ -120,19 +118,10 @@ def test_another_plate_is_as_stated(tmp_path: Path) -> None:
     assert "all positions fit a large 2.00 times as large" in refusal(tmp_path, true, table)
 
 
-def test_other_gross_errors_are_told_as_before(tmp_path: Path) -> None:
+def test_no_common_size_is_claimed_of_one_position(tmp_path: Path) -> None:
     true = tree((3, 3), (200, 200), ["p", "q"])
     table = read(tmp_path, true)
-    swapped = table.copy()
-    swapped.loc[[0, 4], "ball"] = table.loc[[4, 0], "ball"].to_list()
-    assert "swap the names of the balls" in refusal(tmp_path, true, swapped)
-    turned = tree((3, 3), (200, 200), ["p", "q"])
-    turned["positions"][0]["quarter_turns"] = 1
-    assert "turned by" in refusal(tmp_path, turned, table)
-    # Of a plate that is read in one position only as another one, no common size is claimed.
-    mixed = table.copy()
-    rows = mixed["position"] == "a"
-    columns = ["x_mm", "y_mm"]
-    middle = mixed.loc[rows, columns].mean()
-    mixed.loc[rows, columns] = middle + 1.6 * (mixed.loc[rows, columns] - middle)
-    assert "as large" not in refusal(tmp_path, true, mixed)
+    rows, columns = table["position"] == "a", ["x_mm", "y_mm"]
+    middle = table.loc[rows, columns].mean()
+    table.loc[rows, columns] = middle + 1.6 * (table.loc[rows, columns] - middle)
+    assert "as large" not in refusal(tmp_path, true, table)

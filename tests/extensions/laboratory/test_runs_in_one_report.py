@@ -17,6 +17,7 @@ from ballplate.simulator.inputs.messages import ExperimentError
 
 from tests.extensions.laboratory import makers
 from tests.extensions.laboratory.makers import Ball
+from tests.extensions.laboratory.tables import ROWS, names_read, of_table
 
 D = Decimal
 QUICKSTART = "designs/quickstart.yaml"
@@ -54,10 +55,8 @@ def pcdmis_parts(runs: int, what: str = "SER NUMBER : {}") -> str:
     )
 
 
-def dmis_files(runs: int, what: str = "") -> str:
-    return "".join(
-        makers.dmis(of_run(run), more=what.format(run + 1)) for run in range(runs)
-    )  # fmt: skip
+def dmis_files(runs: int) -> str:
+    return "".join(makers.dmis(of_run(run)) for run in range(runs))
 
 
 def dmis_points(runs: int) -> str:
@@ -101,14 +100,11 @@ def qif_results(runs: int) -> str:
 
 RUNS: dict[str, Callable[[int], str]] = {
     "part numbers": calypso_parts,
-    "other part numbers": lambda runs: calypso_parts(runs, texts="P-17 P-18 P-40"),
     "part numbers, by characteristic": calypso_by_characteristic,
     "a column that no list has": lambda runs: calypso_parts(runs, "Durchgang", "a b c"),
-    "LFD_NR": lambda runs: calypso_parts(runs, "LFD_NR"),
     "serial numbers": pcdmis_parts,
     "times of day": lambda runs: pcdmis_parts(runs, "DATE=04-Mar-26     TIME=09:1{}:31 AM"),
     "files of DMIS": dmis_files,
-    "serial numbers of DMIS": lambda runs: dmis_files(runs, "PS(1)=PARTSN/'{}'"),
     "times of DMIS": lambda runs: "FILNAM/'A'\n" + "".join(
         makers.dmis(of_run(run)).replace("FILNAM/", "$$").replace("UNITS", f"TIME/10:0{run}:00\nUNITS")
         for run in range(runs)
@@ -179,51 +175,32 @@ def test_runs_that_nothing_tells_apart_are_counted(tmp_path: Path, form: str) ->
     assert 'ball "r1c1" is read 2 times in position "report", as are 2 others (2 runs' in warning
 
 
-def exact(positions: Sequence[str]) -> tuple[list[list[Ball]], str]:
-    """Ball centres of positions of the quickstart as they are planned, and the rule of names."""
-    simulated = bp.simulate(QUICKSTART, exact=True)
-    offsets = {"down": (0, 0, -50)}
-    runs = []
-    for position in positions:
-        rows = simulated[(simulated["position"] == position) & (simulated["probe"] == "down")]
-        runs.append(
-            [
-                Ball(row.ball, "", tuple(  # type: ignore[arg-type]
-                    round(D(value) + D(shift), 7)
-                    for value, shift in zip((row.x_mm, row.y_mm, row.z_mm), offsets["down"], strict=True)
-                ))
-                for row in rows.itertuples()
-            ]
-        )  # fmt: skip
-    return runs, "{ball}"
-
-
-def fitted(tmp_path: Path, label: str, **readings: object) -> object:
-    runs, _ = exact(["z low", "z high"])
-    text = "".join(
-        makers.pcdmis(balls).replace("SER NUMBER : 1", f"SER NUMBER : {label.format(run)}")
-        for run, balls in enumerate(runs, start=17)
-    )
-    path = tmp_path / "monday.txt"
-    path.write_text(text, encoding="utf-8")
-    experiment = bp.load(QUICKSTART).with_readings(readings)
-    from ballplate.simulator.experiment import lay_out
-    from ballplate.simulator.readings import read_readings
-
-    return read_readings(path, lay_out(experiment), settings=experiment.readings)
+def exact(positions: Sequence[str]) -> list[list[Ball]]:
+    """Ball centres of positions of the quickstart, which one probe reads, as they are planned."""
+    return [
+        [
+            Ball(row.ball, "", (D(row.x_mm), D(row.y_mm), D(row.z_mm) - 50))
+            for row in ROWS
+            if row.position == position
+        ]
+        for position in positions
+    ]
 
 
 def test_fit_matches_runs_by_their_places(tmp_path: Path) -> None:
-    observed = fitted(tmp_path, "SN-{}")
-    names = [observed.design.positions.names[k] for k in observed.design.readings.position]  # type: ignore[attr-defined]
-    assert names == ["z low"] * 25 + ["z high"] * 25
-    told = " ".join(observed.remarks)  # type: ignore[attr-defined]
+    text = "".join(
+        makers.pcdmis(balls).replace("SER NUMBER : 1", f"SER NUMBER : SN-{run}")
+        for run, balls in enumerate(exact(["z low", "z high"]), start=17)
+    )
+    found = of_table(tmp_path, text, "monday.txt")
+    assert [name for name, *_ in names_read(found)] == ["z low"] * 25 + ["z high"] * 25
+    told = " ".join(found.remarks)
     assert "2 runs by SER NUMBER (SN-17, SN-18), each is a position of its own" in told
     assert "monday SN-17 = z low, monday SN-18 = z high" in told
 
 
 def test_the_rule_names_a_position_by_its_run(tmp_path: Path) -> None:
-    simulated, _ = exact(["z low", "z high"])
+    simulated = exact(["z low", "z high"])
     balls = [
         Ball(f"{ball.name}/{name}", "", ball.centre)
         for name, run in zip(("ZLOW", "ZHIGH"), simulated, strict=True)

@@ -65,14 +65,6 @@ def test_a_table_without_names_is_matched_by_its_nominal_places(tmp_path: Path) 
     assert any("balls by nominal co-ordinates" in one for one in found.remarks)
 
 
-def test_nominal_places_may_stand_below_a_line(tmp_path: Path) -> None:
-    rows = [row for row in ROWS if row[0] == "z high"]
-    lines = [[*(f"{value:.1f}" for value in row[3:]), *row[3:]] for row in rows]
-    head = [["Soll", "", "", "Ist", "", ""], [*"XYZXYZ"]]
-    found = observed(tmp_path, [*head, *lines], "z high.csv")
-    assert names_read(found) == [row[:3] for row in rows]
-
-
 def test_a_feature_at_another_place_is_no_ball(tmp_path: Path) -> None:
     rows = [row for row in ROWS if row[0] == "z high"]
     lines = [[*row[3:], *row[3:]] for row in rows]

@@ -9,38 +9,21 @@ from pathlib import Path
 
 import ballplate as bp
 import pytest
-import yaml
 from ballplate.cli import main
 from ballplate.extensions.laboratory.formats.registered import recognised
 from ballplate.simulator.inputs.messages import ExperimentError
 
 from tests.extensions.laboratory import makers
 from tests.extensions.laboratory.makers import Ball
+from tests.extensions.laboratory.test_other_characteristics import EXPERIMENT, PLACES
 
 D = Decimal
+NAMES = ["左", "右", "上", "下"]
 BALLS = [
-    Ball("左", "", (D("0.0012"), D("-0.0009"), D("250.0007"))),
-    Ball("右", "", (D("300.0031"), D("0.0004"), D("249.9991"))),
+    Ball(name, "", (D(str(x)), D(str(y)), D(str(z))))
+    for name, (x, y, z) in zip(NAMES, PLACES.values(), strict=True)
 ]
 PLAIN = [Ball("P1_a", "", BALLS[0].centre), Ball("P1_b", "", BALLS[1].centre)]
-EXPERIMENT = {
-    "title": "two balls",
-    "machine": {"volume": ["1 m", "1 m", "1 m"], "repeatability": "1 um"},
-    "error_model": {"kind": "metric"},
-    "probes": {"p": ["0 mm", "0 mm", "0 mm"]},
-    "artefacts": {
-        "plate": {
-            "kind": "balls",
-            "coordinates": {"左": ["0 mm"] * 3, "右": ["300 mm", "0 mm", "0 mm"]},
-        }
-    },
-    "positions": [
-        {"name": "P1", "pose": {"origin": ["0 mm", "0 mm", "250 mm"], "rotation": ["0 deg"] * 3}}
-    ],
-    "calibration": [{"kind": "coordinates", "standard_uncertainty": "1 um"}],
-    "evaluation": {"points": {"random": 20, "seed": 1}},
-}
-
 # Reports of optical machines: a heading, then blocks; rows of a table; rows below each other.
 OTHER_PROGRAMS = [
     """Machine Serial Number: SN7      Page: 1
@@ -87,16 +70,17 @@ def test_rich_text_is_named(tmp_path: Path, before: bytes, after: bytes, text: s
 
 
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-16", "utf-16-le", "cp1252"])
-@pytest.mark.parametrize("count", [1, 2, 3, 512])
-def test_zero_bytes_at_the_end_change_nothing(tmp_path: Path, encoding: str, count: int) -> None:
+@pytest.mark.parametrize("end", ["\0", "\0\0", "\0" * 3, "\0" * 512, "\x1a"])
+def test_zero_bytes_at_the_end_change_nothing(tmp_path: Path, encoding: str, end: str) -> None:
     path = tmp_path / "report.txt"
-    zeros = b"\0" * (count if "16" not in encoding else 2 * count)
     for text in (makers.calypso(PLAIN), makers.dmis(PLAIN), makers.pcdmis(PLAIN)):
         text = text.replace("PLATE", "Prüfung")
         path.write_bytes(text.encode("utf-8"))
         expected = bp.read_report(path).to_frame()
-        path.write_bytes(text.encode(encoding) + zeros)
-        assert bp.read_report(path).to_frame().equals(expected)
+        path.write_bytes((text + end).encode(encoding))
+        found = bp.read_report(path)
+        assert found.to_frame().equals(expected)
+        assert (f"{path}: not UTF-8; read as cp1252" in found.remarks) == (encoding == "cp1252")
 
 
 @pytest.mark.parametrize("more", ["", "x"])
@@ -114,18 +98,20 @@ def test_a_zero_byte_within_is_named_with_its_line(tmp_path: Path, more: str) ->
 def test_reports_are_read_in_the_encoding_that_is_stated(
     tmp_path: Path, encoding: str, form: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    experiment = EXPERIMENT | {"readings": {"encoding": encoding}}
-    path = tmp_path / "two.yaml"
-    path.write_text(yaml.safe_dump(experiment, allow_unicode=True), encoding="utf-8")
+    experiment = EXPERIMENT.replace("coordinates: ball centres", f"encoding: {encoding}")
+    for old, new in zip(PLACES, NAMES, strict=True):
+        experiment = experiment.replace(f"{old}:", f"{new}:")
+    path = tmp_path / "four.yaml"
+    path.write_text(experiment, encoding="utf-8")
     report = tmp_path / "P1.txt"
     text = getattr(makers, form)(BALLS).replace("⊕", "")
     report.write_bytes(text.encode(encoding))
     read = bp.read_report(report, path)
-    assert read.to_frame()["ball"].tolist() == ["左", "右"]
-    assert read.to_frame()["x_mm"].tolist() == [0.0012, 300.0031]
+    assert read.to_frame()["ball"].tolist() == NAMES
+    assert read.to_frame()["x_mm"].tolist() == [place[0] for place in PLACES.values()]
     capsys.readouterr()
     assert main(["fit", str(path), str(report)]) in (0, 1)
     shown = capsys.readouterr()
     assert "左" in shown.out and "cp1252" not in shown.err
     fit = bp.fit(path, report)
-    assert fit.to_dict()["observations"] == 12
+    assert fit.to_dict()["observations"] == 24

@@ -79,7 +79,7 @@ BOMB = "".join(f'<!ENTITY e{i} "{f"&e{i - 1};" * 10}">' for i in range(1, 10))
 def test_no_document_type_is_read(text: str) -> None:
     place, _, told = refusal(text.encode()).partition(": ")
     assert place.startswith("f:1:")
-    assert told == wording.A_DOCUMENT_TYPE_DOCTYPE
+    assert told.startswith(wording.A_DOCUMENT_TYPE_DOCTYPE)
 
 
 @pytest.mark.parametrize(

@@ -3,19 +3,14 @@
 ARE_NOT_AMONG_THE_POINTS = '"2 7" are not among the 6 points of the set'
 ARE_NOT_IN_THE_EXPERIMENT = "are not in the experiment"
 ARE_SAID_TO_BE_IN = 'lengths of "X'
-A_DOCUMENT_TYPE_DOCTYPE = (
-    "a document type (<!DOCTYPE …>) is not read, nor any entity of it; remove it"
-)
+A_DOCUMENT_TYPE_DOCTYPE = "a document type (<!DOCTYPE …>) is not read, nor any entity of it"
 A_LINE_WITHOUT_CO_ORDINATES_AMONG = "a line without co-ordinates among the rows"
 A_TABLE_BESIDE_REPORTS_STATE_WHAT = "a table beside reports .* state what all"
 BALLS_MATCHED_BY_NUMBER_IN_READING = "balls matched by number in reading order"
 CENTRES_ARE_IN_A_PARTS_CO = "2 centres are in a part's co-ordinate system (PART)"
 CENTRES_IN_THE_MACHINES = "warning: centres in the machine's and in a part's system"
 CENTRE_IS_OF_POINTS = "1 centre is of points on the surface"
-COLUMNS_FOUND_MISSING = (
-    'columns found: "Lage", "Taster", "X [mm]", "Y [mm]", "Z [mm]"; missing: ball; name '
-    "them in the experiment file: readings: {columns: {ball: …}}"
-)
+COLUMNS_FOUND_MISSING = '"Taster", "X [mm]", "Y [mm]", "Z [mm]"; missing: ball; name them'
 COLUMNS_INSTEAD_OF = "9 columns instead of 6"
 CORRECT_THE_NAMES_OF_THE_BALLS = "correct the names of the balls"
 COULD_ALL_BE = "could all be x; say which"
@@ -46,26 +41,15 @@ LEAVE_THE_COLUMN_OUT = "leave the column out"
 LENGTHS_ARE_IN = "lengths are in in, the experiment file mm"
 LOW_THE_READINGS_FIT_THE_PLATE = "z low: the readings fit the plate turned by 180"
 MAY_HAVE_BEEN_CUT_OFF = "may have been cut off"
-MISSING_BALL_AND_AXES = (
-    'columns found: "A", "B", "C"; missing: ball, x, y, z (and position, probe, unless stated'
-)
+MISSING_BALL_AND_AXES = '"A", "B", "C"; missing: ball, x, y, z (and position, probe, unless'
 MISSING_BALL_AND_POSITION = "missing: ball (and position, unless stated elsewhere)"
 MORE_THAN_ELEMENTS = "f:1:12: more than 3 elements; leave some out"
 NOTHING_IS_FILLED = "x, y, z are empty in all"
 NOR_ONE_ABOVE_IT = 'merged-en.csv:2:1: no "Position", nor one above it'
-NOT_RECOGNISED_AS_QIF_RESULTS = (
-    "report: not recognised as QIF results, DMIS output, PC-DMIS report, Calypso table; "
-    "state its format with --from (qif, dmis, pcdmis, calypso); a table needs no import: "
-    "ballplate fit reads it"
-)
+NOT_RECOGNISED_AS_QIF_RESULTS = "state its format with --from (qif, dmis, pcdmis, calypso)"
 NO_CLOCK_TIMES = "no clock times, which 0.csv has"
 NO_MEASUREMENT_RESULTS = "no measurement results; is it a plan, or a model?"
-NO_NAMES_OF_THE_EXPERIMENT = (
-    "f: no names of the experiment in KUGEL A, KUGEL B; its positions are z low, z high, "
-    "x low and 3 more, its balls r1c1, r1c2, r1c3 and 22 more; state the rule with "
-    "--name, such as {position}_{ball}"
-)
-NO_NAMES_OF_THE_EXPERIMENT_2 = "no names of the experiment in r1c1"
+NO_NAMES_OF_THE_EXPERIMENT = "its positions are z low, z high, x low and 3 more, its balls r1c1"
 NO_POINTS_WITH_THE_ID = 'no points with the id "13" in clear'
 NO_POSITION_OR_PROBE = (
     'merged-en.csv:3:1: no "Position" or "Probe" in line 3 and 83 more; if it is the name above, as'
@@ -101,32 +85,20 @@ STATE_THE_RULE_WITH_NAME = "state the rule with --name"
 SWAP_THE_NAMES_OF_THE_BALLS = "swap the names of the balls in lines 54 and 55"
 TABLE_OF_THE_NOMINAL_CENTRES = "table of the nominal centres of balls"
 THERE_IS_NO_COLUMN = 'there is no column "F"'
-THE_CONTROL_CHARACTER_IS_NO_PART = (
-    "report:2:1: the control character U+0007 is not allowed in a text"
-)
-THE_DEVIATION_IS_NOT_MEASURED_MINUS = (
-    "report:14:1: X: the deviation is not measured minus nominal; is the line damaged?"
-)
+THE_DEVIATION_IS_NOT_MEASURED_MINUS = "report:14:1: X: the deviation is not measured minus nominal"
 THE_ERRORS_THAT_IT_LEAVES = "the errors that it leaves"
 THE_FILE_IS_NAMED_TWICE = "the file is named twice"
 THE_FILE_STATES_NO_UNIT = "the file states no unit of length; state it with --unit mm"
-THE_NAMES_CAN_BE_READ = (
-    "f: the names can be read as {position}_{ball}_{probe} and {position}_{probe}_{ball}; "
-    "state the one that is right with --name"
-)
+THE_NAMES_CAN_BE_READ = "as {position}_{ball}_{probe} and {position}_{probe}_{ball}; state"
 THE_NAMES_OF_BALLS = (
     "the names of balls r2c2 and r2c1 in position P3 were swapped (lines 54 and 55)"
 )
 THE_NAME_CAN_BE_PARTED = 'the name "z_low_r1c1" can be parted as {position}_{ball} in several ways'
 THE_NAME_OF_THE_FILE = 'position "t" by the name of the file'
-THE_PROBES_ARE_NOT_IN_THE_EXPERIMENT = (
-    'the probes "T1", "T2", "T3", "T4", "T5" are not in the experiment, and neither the plan nor'
-)
+THE_PROBES_ARE_NOT_IN_THE_EXPERIMENT = '"T1", "T2", "T3", "T4", "T5" are not in the experiment'
 THE_SHEETS_HAVE_TABLES = 'the sheets "Monday", "Tuesday" have tables; give --sheet'
 THIS_IS_A_DMIS = "this is a DMIS program, not a report"
 THIS_IS_A_REPORT = "this is a report of a measuring program (DMIS output), and no table"
 TOO_FEW_BALLS_WERE_READ = "too few balls were read in z high"
-WORKBOOKS_NEED_OPENPYXL = (
-    "workbooks need openpyxl; install it with: python -m pip install 'ballplate[xlsx]'"
-)
+WORKBOOKS_NEED_OPENPYXL = "install it with: python -m pip install 'ballplate[xlsx]'"
 X_AGAIN = "3:1: x again, in the reading of line 2, which lacks others"

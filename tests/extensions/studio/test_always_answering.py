@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import ballplate as bp
 import numpy as np
 import pytest
@@ -20,13 +18,6 @@ from tests.extensions.studio.small import SMALL as TEXT
 from tests.reference.small_quickstart import in_lengths
 
 NAMES = ["z low", "z high", "x low", "x high", "y low", "y high"]
-
-
-@pytest.fixture
-def document(tmp_path: Path) -> DesignDocument:
-    path = tmp_path / "plate.yaml"
-    path.write_text(TEXT, encoding="utf-8")
-    return opened(path)
 
 
 def scene_of(document: DesignDocument) -> dict:

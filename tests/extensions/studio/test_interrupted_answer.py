@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import signal
-import subprocess
 import sys
-import urllib.request
 from contextlib import suppress
-from http.cookiejar import CookieJar
 from pathlib import Path
 from threading import Thread
 
 import pytest
+
+from tests.extensions.studio.test_judging import begun
 
 # A signal comes in the server's own thread while another one waits, or while it sends an answer.
 SCRIPT = """
@@ -42,25 +40,13 @@ def test_no_traceback_of_an_answer_that_is_interrupted(
 ) -> None:
     script = SCRIPT.replace("PLACE", place).replace("SECONDS", str(seconds))
     (tmp_path / "slow.py").write_text(script)
-    words = [sys.executable, "slow.py", "studio", "new.yaml", "--no-browser"]
-    with subprocess.Popen(
-        words,
-        cwd=tmp_path,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        # A shell starts what runs in the background with this signal ignored.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    ) as process:
-        assert process.stdout is not None and process.stderr is not None
-        address = process.stdout.readline().strip()
-        opener = urllib.request.build_opener(urllib.request.HTTPCookieProcessor(CookieJar()))
-        opener.open(address).read()
+    process, home, opener = begun(str(tmp_path / "slow.py"), "studio", str(tmp_path / "new.yaml"))
 
-        def ask() -> None:
-            with suppress(OSError):
-                opener.open(f"{address.partition('?')[0]}api/state").read()
+    def ask() -> None:
+        with suppress(OSError):
+            opener.open(f"{home}api/state").read()
 
+    with process:
         Thread(target=ask, daemon=True).start()
         try:
             told = process.communicate(timeout=60)[1]

@@ -14,32 +14,16 @@ from http.cookiejar import CookieJar
 from pathlib import Path
 
 import pytest
-from ballplate.designs import shipped
 
 pytest.importorskip("starlette", reason="the studio is an extra")
 
 from ballplate.extensions.studio.recovery import kept_in
-from ballplate.extensions.studio.session import RefusedError, Session
+from ballplate.extensions.studio.session import RefusedError
 
 from tests.extensions.studio.test_recovery import MODEL, in_python
 
 POINTS = "points: {random: 200, seed: 1}"
 SLOW = "points: {random: 20000, seed: 1}"
-
-
-@pytest.fixture
-def design(tmp_path: Path) -> Path:
-    path = tmp_path / "plate.yaml"
-    path.write_bytes(Path(shipped("quickstart.yaml")).read_bytes())
-    return path
-
-
-@pytest.fixture
-def session(design):
-    found = Session(design)
-    found.state()
-    yield found
-    found.close()
 
 
 def kept_text(design: Path) -> str:
@@ -142,6 +126,24 @@ def test_other_requests_are_answered_while_quantities_are_kept(session, monkeypa
     assert found == [True] and session.state()["kept"] == {"quantities": []}
 
 
+def begun(*words: str) -> tuple[subprocess.Popen, str, urllib.request.OpenerDirector]:
+    """A studio in a process of its own, its address, and who may ask it."""
+    process = subprocess.Popen(
+        [sys.executable, *words, "--no-browser"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        # A shell starts what runs in the background with this signal ignored.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    )
+    assert process.stdout is not None
+    address = process.stdout.readline().strip()
+    opener = urllib.request.build_opener(urllib.request.HTTPCookieProcessor(CookieJar()))
+    opener.open(address).read()
+    return process, address.partition("?")[0], opener
+
+
 def below(process: int) -> set[int]:
     """The processes that a process has begun, and those that these have."""
     found = set()
@@ -157,20 +159,8 @@ def below(process: int) -> set[int]:
 
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks processes up in /proc")
 def test_the_command_answers_and_ends_while_it_judges(design):
-    command = [sys.executable, "-m", "ballplate", "studio", str(design), "--no-browser"]
-    process = subprocess.Popen(
-        command,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
-    )
+    process, home, opener = begun("-m", "ballplate", "studio", str(design))
     try:
-        address = process.stdout.readline().strip()
-        opener = urllib.request.build_opener(urllib.request.HTTPCookieProcessor(CookieJar()))
-        opener.open(address).read()
-        home = address.partition("?")[0]
 
         def ask(path: str, body: object = None) -> dict:
             content = None if body is None else json.dumps(body).encode()

@@ -9,7 +9,6 @@ from pathlib import Path
 import ballplate as bp
 import numpy as np
 import pytest
-from ballplate.designs import shipped
 
 pytest.importorskip("starlette", reason="the studio is an extra")
 
@@ -17,14 +16,10 @@ from ballplate.extensions.studio.actions import done
 from ballplate.extensions.studio.document import DesignDocument, experiment_of, opened
 from ballplate.extensions.studio.judging import judgement
 
-TEXT = Path(shipped("quickstart.yaml")).read_text(encoding="utf-8")
-
 
 @pytest.fixture
-def document(tmp_path: Path) -> DesignDocument:
-    path = tmp_path / "plate.yaml"
-    path.write_text(TEXT, encoding="utf-8")
-    return opened(path)
+def document(design: Path) -> DesignDocument:
+    return opened(design)
 
 
 def line_of(document: DesignDocument, name: str) -> str:

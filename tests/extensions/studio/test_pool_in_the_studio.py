@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import time
-from pathlib import Path
 
 import ballplate as bp
 import pytest
@@ -20,19 +19,10 @@ from ballplate.presentation import as_data
 from ballplate.simulator.experiment import Experiment
 from ballplate.simulator.inputs import ExperimentError
 
-from tests.extensions.studio.small import SMALL
-
 PROBES = {"x": ["right", "left"], "y": ["back", "front"], "z": ["down"]}
 FILL = {"do": "fill", "probes": PROBES, "quarter_turns": [0, 1], "count": 3}
 FEW = {"probes": {"z": ["down"]}, "quarter_turns": [0], "count": 2}
 FORBIDDEN = ["pool", "limits", "forbidden"]
-
-
-@pytest.fixture
-def document(tmp_path: Path) -> DesignDocument:
-    path = tmp_path / "plate.yaml"
-    path.write_text(SMALL, encoding="utf-8")
-    return opened(path)
 
 
 def pooled(document: DesignDocument) -> dict:

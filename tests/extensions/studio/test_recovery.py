@@ -44,14 +44,6 @@ def build(lower, upper):
 SETTINGS = "{kind: python, object: 'model:build'}"
 
 
-@pytest.fixture
-def design(tmp_path: Path) -> Path:
-    path = tmp_path / "plate.yaml"
-    text = Path(shipped("quickstart.yaml")).read_text(encoding="utf-8")
-    path.write_text(text, encoding="utf-8", newline="\n")
-    return path
-
-
 def test_what_was_not_saved_is_there_again_with_the_file_a_step_back(design):
     session = Session(design)
     assert not kept_in(design).exists()

@@ -1,14 +1,13 @@
 """What the studio answers, and whom it refuses."""
 
+import base64
 import json
 import time
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 
 import ballplate as bp
 import pytest
 import yaml
-from ballplate.designs import shipped
 
 pytest.importorskip("starlette", reason="the studio is an extra")
 
@@ -23,20 +22,6 @@ from tests.extensions.studio import wording
 
 PORT, TOKEN = 8123, "a-token-of-the-tests"
 HOME = f"http://127.0.0.1:{PORT}"
-
-
-@pytest.fixture
-def design(tmp_path: Path) -> Path:
-    path = tmp_path / "quickstart.yaml"
-    path.write_bytes(Path(shipped("quickstart.yaml")).read_bytes())
-    return path
-
-
-@pytest.fixture
-def session(design):
-    found = Session(design)
-    yield found
-    found.close()
 
 
 @pytest.fixture
@@ -402,10 +387,6 @@ def test_suggestions_are_what_the_file_becomes(client, design):
 
 @pytest.mark.slow
 def test_dropped_readings_are_fitted(client, design):
-    import base64
-
-    import ballplate as bp
-
     table = bp.simulate(design).to_csv(index=False).encode()
     content = base64.b64encode(table).decode()
     client.post(
