@@ -27,6 +27,8 @@ def at_every(
     (3.0, 6.0)
     >>> at_every(np.arange(1.0, 17.0), 3, 1.0, 16.0, [8.0])
     (3.0, 13.0)
+    >>> at_every(np.arange(1.0, 17.0), 5, 1.0, 16.0, [8.0])
+    (5.0, 12.0)
     """
     distinct = np.unique(x)
     knots_found = []

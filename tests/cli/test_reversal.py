@@ -228,6 +228,7 @@ def test_balls_read_in_one_position_are_left_out(tmp_path: Path) -> None:
     away = readings.ball.isin(["r2c2", "r3c1"])
     one = bp.fit(experiment, readings[~away | (readings.position == "straight")], **AS_REVERSAL)
     whole = bp.fit(experiment, readings, **AS_REVERSAL)
+    assert f"alpha {1e6 * whole.estimates[0].value:.4g} µ" in whole.headline()
     kept = np.flatnonzero(~np.isin(whole.names, ["r2c2", "r3c1"]))
     assert one.found.residuals.shape == (len(kept), 2)
     assert one.found.degrees_of_freedom == 2 * len(kept) - 5

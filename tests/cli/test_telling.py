@@ -9,6 +9,7 @@ import shlex
 import sys
 from importlib.metadata import version
 from pathlib import Path
+from time import monotonic, process_time
 
 import pytest
 from ballplate.cli import main
@@ -36,9 +37,12 @@ def test_results_are_the_same(
     lines = verbose[2]
     assert lines[0] == f"ballplate {version('ballplate')}" and f"numpy {version('numpy')}" in lines
     assert f"reads {file}" in lines
-    assert re.fullmatch(
-        rf"{command}: [0-9.e-]+ s, [0-9.e-]+ s of the processor in this process", lines[-1]
+    taken = re.fullmatch(
+        rf"{command}: ([0-9.e-]+) s, ([0-9.e-]+) s of the processor in this process", lines[-1]
     )
+    assert taken is not None
+    # All of the process, and of these tests.
+    assert 0.0 < float(taken[2]) < process_time() and 0.0 < float(taken[1]) < monotonic()
 
 
 def test_files_that_an_experiment_names_are_told(capsys: pytest.CaptureFixture[str]) -> None:

@@ -200,6 +200,15 @@ class Linear:
         return int(np.linalg.matrix_rank(self.rows) + len(self.known) - together)
 
 
+@pytest.mark.parametrize(
+    ("squares", "freedom", "sigma"), [(None, 5, 1.3), (0.0, 0, 1.3), (45.0, 5, 3.0)]
+)
+def test_sigma_of_an_earlier_campaign_is_the_stated_one_without_residuals(
+    squares: float | None, freedom: int, sigma: float
+) -> None:
+    assert EarlierCampaign("", 1.3, freedom, squares).estimate == pytest.approx(sigma)
+
+
 def dense(experiment: bp.Experiment) -> tuple[np.ndarray, int]:
     """Derivatives of all whitened residuals at the design as drawn by shared parameters and balls,
     by differences, and degrees of freedom; the machine's parameters in their own units.
