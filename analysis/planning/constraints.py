@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from ballplate.simulator.experiment.model import AtMost, Candidate, ChangeTimes, Position
-from ballplate.simulator.inputs.number_arrays import Integers
+from ballplate.simulator.inputs.number_arrays import Flags, Integers
 from ballplate.simulator.inputs.settings import number_of
 from ballplate.simulator.machines.protocol import Array
 
@@ -87,6 +88,14 @@ class Constraints:
     def count(self) -> int:
         return len(self.seconds)
 
+    @cached_property
+    def _of_kinds(self) -> dict[Setup | None, Flags]:
+        """Flags (n,) of the candidates of each change-over class."""
+        return {
+            kind: np.array([other == kind for other in self.kinds])
+            for kind in dict.fromkeys(self.kinds)
+        }
+
     def spent(self, chosen: Collection[int]) -> Spent:
         """Return the cost of a selection without completed readings."""
         added = sorted(set(chosen) - self.done)
@@ -135,24 +144,20 @@ class Constraints:
         for limit in self.at_most:
             if len(members.intersection(limit.members)) >= limit.count:
                 allowed[list(limit.members)] = False
-        spent, budget = self.spent(members), self.budget
+        added, budget = sorted(members - self.done), self.budget
         if budget.readings is not None:
-            allowed &= self.readings <= budget.readings - spent.readings
+            allowed &= self.readings <= budget.readings - int(self.readings[added].sum())
         if budget.positions is not None:
-            allowed &= self.positions <= budget.positions - spent.positions
+            allowed &= self.positions <= budget.positions - int(self.positions[added].sum())
         if budget.seconds is not None:
-            added = sorted(members - self.done)
             seconds_left = budget.seconds + SLACK - float(self.seconds[added].sum())
             kinds, first = self._kinds(added), self._first(added)
             is_first = np.arange(self.count) == self.first
-            for kind in dict.fromkeys(self.kinds):
+            for kind, is_of_kind in self._of_kinds.items():
                 within = seconds_left - changeover(
                     kinds if kind is None else [*kinds, kind], self.changes, first
                 )
-                too_long = np.array([further_kind == kind for further_kind in self.kinds]) & (
-                    self.seconds > within
-                )
-                allowed &= ~too_long | is_first
+                allowed &= ~is_of_kind | (self.seconds <= within) | is_first
             if self.first is not None and first is None:
                 within = seconds_left - changeover(kinds, self.changes, self.kinds[self.first])
                 allowed[self.first] &= bool(self.seconds[self.first] <= within)
