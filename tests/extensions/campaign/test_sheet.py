@@ -16,6 +16,7 @@ import pytest
 from ballplate.cli import main
 from ballplate.extensions.campaign.reading_lists import planned_readings
 from ballplate.extensions.campaign.sheet import Sheet, sheet_of
+from ballplate.presentation.scenes import hull
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 
@@ -152,6 +153,7 @@ def test_the_head_has_what_is_filled_in_by_hand(sheet: Sheet) -> None:
         assert name in text
     flat = re.sub(r"<[^>]*>|\|", " ", text)
     assert re.search(r"right\s+30\s+0\s+-40", flat)
+    assert re.search(r"volume\s+600 x 500 x 450 mm\s+repeatability\s+1 µm", flat)
 
 
 def test_angles_of_a_head_are_those_of_the_file(tmp_path: Path) -> None:
@@ -170,26 +172,59 @@ def test_angles_of_a_head_are_those_of_the_file(tmp_path: Path) -> None:
 
 
 def test_positions_in_the_volume_are_named_with_a_dot_at_their_first_balls(sheet: Sheet) -> None:
+    """The drawing fills its frame; axes are named outside of the volume, positions beyond the
+    middle of their outlines.
+    """
     page = sheet.page()
     drawing = page[page.index('<svg class="volume"') : page.index("</svg>")]
-    corners = [
-        np.array([[float(x) for x in one.split(",")] for one in points.split()])
-        for points in re.findall(r'<polygon points="(.*?)"', drawing)
-    ]
+    edges, outlines = (
+        [
+            np.array([point.split(",") for point in points.split()], float)
+            for points in re.findall(rf'<{tag} points="(.*?)"', drawing)
+        ]
+        for tag in ("polyline", "polygon")
+    )
+    size = np.array(re.findall(r'viewBox="0 0 (\S+) (\S+)"', drawing)[0], float)
+    every = np.concatenate([*edges, *outlines])
+    np.testing.assert_allclose(every.min(axis=0), 34.0, atol=0.6)
+    np.testing.assert_allclose(every.max(axis=0), size - 34.0, atol=0.6)
+    assert size[0] <= 660.0 and (size - [660.0, 68.0 + 495.0]).max() == 0.0
     dots = np.array(re.findall(r'<circle cx="(.*?)" cy="(.*?)" r="4"', drawing), float)
     texts = re.findall(r'<text x="(.*?)" y="(.*?)".*?>(.*?)</text>', drawing)
-    names = {name: np.array([x, y], float) for x, y, name in texts}
-    assert {step.name for step in sheet.sheet.steps} <= set(names)
-    assert len(corners) == len(dots) == 4
-    for outline, dot in zip(corners, dots, strict=True):
+    places = np.array([text[:2] for text in texts], float) - [0.0, 4.0]
+    told = [text for *_, text in texts]
+    assert told[:9] == ["0", "x, mm", "600", "0", "y, mm", "500", "0", "z, mm", "450"]
+    for ends in places[:9].reshape(3, 3, 2):
+        np.testing.assert_allclose(ends[1], 0.5 * (ends[0] + ends[2]), atol=0.11)
+        assert ends[1] in hull(np.concatenate([*edges, ends[1:2]]))
+    assert set(told[9:]) == {step.name for step in sheet.sheet.steps}
+    for name, outline, dot in zip(places[9:], outlines, dots, strict=True):
         assert np.linalg.norm(outline - dot, axis=1).min() < 0.11
-    for step in sheet.sheet.steps:
-        # A name is nearer to the middle of an outline than its corners are.
-        assert any(
-            np.linalg.norm(names[step.name] - [0.0, 4.0] - outline.mean(axis=0))
-            < np.linalg.norm(outline - outline.mean(axis=0), axis=1).max()
-            for outline in corners
-        )
+        middle = outline.mean(axis=0)
+        np.testing.assert_allclose(name - middle, 0.3 * (middle - dot), atol=0.2)
+
+
+def test_a_long_name_is_a_number_in_the_drawing(tmp_path: Path) -> None:
+    path = tmp_path / "design.yaml"
+    path.write_text(
+        DESIGN.replace("name: P2", "name: nine-more").replace("name: P3", "name: ten-or-more")
+    )
+    page = sheet_of(load(path)[0]).page()
+    assert "</text>" in page and ">nine-more</text>" in page and ">3</text>" in page
+
+
+def test_each_position_tells_where_its_first_and_last_balls_are(sheet: Sheet) -> None:
+    """And its boxes have room for all that is beside them."""
+    page = sheet.page()
+    places = {(position, ball): place for position, ball, _, place in expected()}
+    steps = re.findall(r"<h2>\d+\. (.*?) ?<.*?so that</dt><dd>(.*?) mm</dd>", page)
+    for name, text in steps:
+        for ball, numbers in re.findall(r"ball (\S+) is at \((.*?)\)", text):
+            assert tuple(map(float, numbers.split(","))) == places.get((name, ball), ()), ball
+    assert len(steps) == 4 and page.count("<dt>artefact</dt>") == 4
+    for width, items in re.findall(r'--width: ([\d.]+)em">(.*?)</ol>', page):
+        most = max(map(len, re.findall("<li>(.*?)</li>", items.replace("<i></i>", "##"))))
+        assert 0.6 * most < float(width) < 0.6 * most + 2.0
 
 
 def test_points_are_the_centres_that_the_file_says(sheet: Sheet) -> None:
@@ -228,7 +263,7 @@ def test_a_program_measures_every_ball_with_its_stylus(sheet: Sheet) -> None:
             # On the surface, along the normal that points out of the ball, on the head's side.
             assert place - centres[at] == pytest.approx(11.0 * normal, abs=2e-4)
             tip = {"down": (0, 0, -40), "right": (30, 0, -40)}[probe]
-            assert normal @ tip < 0.0
+            assert normal @ tip < 0.0 and np.linalg.norm(normal) == pytest.approx(1.0, abs=1e-6)
             points -= 1
         elif line == "ENDMES":
             assert points == 0
@@ -383,4 +418,6 @@ def test_every_shipped_design_has_a_sheet() -> None:
         sheet = sheet_of(experiment)
         count = sum(position.count for position in experiment.positions)
         assert len(planned_readings(sheet.sheet, experiment)) == count
-        assert len(of_page(sheet.page())) == count
+        page = sheet.page()
+        assert len(of_page(page)) == count and "<dt>set up</dt>" in page and "-0.0000" not in page
+        assert ("<dt>artefact</dt>" in page) == (len(experiment.artefacts) > 1)

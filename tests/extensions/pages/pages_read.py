@@ -8,7 +8,14 @@ from dataclasses import dataclass
 from html.parser import HTMLParser
 from typing import Any
 
+import numpy as np
+
 VOID = {"meta", "link", "br", "img", "input"}
+# What stands where there is no figure.
+NO_FIGURE = ("", "-", "–", "undetermined", "never", "all", "unknown")
+# What a number in SI units is multiplied with to have the unit that is shown.
+FACTORS = {"mm": 1e3, "mK": 1e3, "arcsec": 180 * 3600 / np.pi}
+FACTORS |= dict.fromkeys(("µm", "µrad", "ppm", "ppm/K", "µm/m", "µm/h"), 1e6)
 
 
 @dataclass
@@ -17,17 +24,17 @@ class Shown:
 
     attributes: dict[str, str]
     text: str = ""
+    tag: str = ""
 
 
 class ResultPage(HTMLParser):
-    """Elements that quote data, cells of tables with what they say besides, and the tags of a
-    page.
-    """
+    """Elements that quote data, tables as rows of cells, and the tags of a page."""
 
     def __init__(self, text: str) -> None:
         super().__init__()
         self.shown: list[Shown] = []
-        self.cells: list[tuple[dict[str, str], str]] = []
+        # Cells with their class, what they say besides the data that they quote, and these.
+        self.tables: list[list[list[tuple[str, str, list[Shown]]]]] = []
         self.tags: list[tuple[str, dict[str, str]]] = []
         self._open: list[tuple[str, dict[str, str], list[str]]] = []
         self.feed(text)
@@ -37,6 +44,12 @@ class ResultPage(HTMLParser):
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         attributes = {name: value or "" for name, value in attrs}
         self.tags.append((tag, attributes))
+        if tag == "table":
+            self.tables.append([])
+        elif tag == "tr":
+            self.tables[-1].append([])
+        elif tag in ("td", "th"):
+            self._before = len(self.shown)
         if tag not in VOID:
             self._open.append((tag, attributes, []))
 
@@ -52,12 +65,13 @@ class ResultPage(HTMLParser):
         assert name == tag
         text = "".join(texts)
         if "data-path" in attributes:
-            self.shown.append(Shown(attributes, text))
+            self.shown.append(Shown(attributes, text, tag))
             # What encloses it says nothing of its own there.
             for _, _, others in self._open:
                 del others[len(others) - len(texts) :]
-        if tag == "td":
-            self.cells.append((attributes, text))
+        if tag in ("td", "th"):
+            quoted = self.shown[self._before :]
+            self.tables[-1][-1].append((attributes.get("class", ""), text, quoted))
 
 
 def at(data: Mapping[str, Any], path: str) -> Any:
@@ -86,9 +100,27 @@ def assert_quoted(text: str, data: Mapping[str, Any]) -> int:
             one,
             value,
         )
-    for attributes, text in page.cells:
-        assert "words" in attributes.get("class", "") or not re.search(r"\d", text), text
+    for heads, *rows in page.tables:
+        titles = [text for _, text, _ in heads]
+        for row in rows:
+            assert_units(titles, row)
     return len(page.shown)
+
+
+def assert_units(titles: list[str], row: list[tuple[str, str, list[Shown]]]) -> None:
+    """Figures are in the unit that the head of their column or their row names, and no words."""
+    of_row = dict(zip(titles, row, strict=True)).get("unit", ("", "", []))[1]
+    for title, (kind, text, shown) in list(zip(titles, row, strict=True))[1:]:
+        figures = [one for one in shown if one.tag == "data"]
+        if figures or shown or text not in NO_FIGURE:
+            assert kind.startswith("words") != bool(figures), (title, text)
+        own, k = re.search(r", (mm|µm|ppm)$", title), re.search(r"k = (\S+)$", title)
+        unit = own[1] if own else of_row
+        for one in figures if unit else ():
+            factor = FACTORS[unit] * float(k[1] if k else 1.0)
+            stated = float(one.attributes.get("data-factor", "1"))
+            is_count = one.attributes.get("value", "0").isdigit()
+            assert is_count or abs(stated / factor - 1.0) < 1e-9, (title, one)
 
 
 def _agrees(text: str, value: float) -> bool:
@@ -104,3 +136,22 @@ def _agrees(text: str, value: float) -> bool:
     if number != text:
         return -1e-9 <= off < 0.01 + 1e-9
     return abs(off) <= 0.5000001 * last
+
+
+def chart_marks(text: str) -> dict[str, np.ndarray]:
+    """Marks of a chart by kind (n, 2), in the numbers of its axes, and the ends of the frame (2, 2),
+    which holds them all.
+    """
+    label = r'<text x="([-\d.]+)" y="([-\d.]+)" text-anchor="%s">(-?[\d.]+)<'
+    across, up = (np.array(re.findall(label % how, text), float) for how in ("middle", "end"))
+    of_x, of_y = np.polyfit(across[:, 0], across[:, 2], 1), np.polyfit(up[:, 1] - 3.5, up[:, 2], 1)
+    frame = re.findall(r"M([\d.]+) [\d.]+H([\d.]+)", text)[0]
+    frame = np.array([frame, re.findall(r"M[\d.]+ ([\d.]+)V([\d.]+)", text)[0]], float).T
+    found = {"frame": frame}
+    for kind, path in re.findall(r'<path class="(dots|line|band) [^"]*" d="(M[^"]*)"', text):
+        found[kind] = np.array(re.findall(r"([-\d.]+) ([-\d.]+)", path), float)
+        assert ((frame[0] <= found[kind]) & (found[kind] <= frame[1])).all() and (frame > 0).all()
+    return {
+        kind: np.stack([np.polyval(of_x, x), np.polyval(of_y, y)], axis=1)
+        for kind, (x, y) in ((kind, marks.T) for kind, marks in found.items())
+    }

@@ -7,6 +7,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from ballplate.extensions.campaign.campaign_picture import draw_curve
 from ballplate.planning.constraints import Budget, Spent
@@ -53,15 +54,16 @@ def texts(campaign: Campaign, folder: Path) -> list[str]:
 
 
 def test_a_picture_with_a_curve_has_all_that_is_compared(found: Campaign, tmp_path: Path) -> None:
-    drawn = texts(found, tmp_path)
-    for text in (
-        "best choice found",
-        "bound of any choice",
-        "as drawn",
-        "target",
-        "hours allowed",
-    ):
-        assert text in drawn
+    """In hours, and in micrometres."""
+    assert "hours allowed" in texts(found, tmp_path)
+    (axes,) = draw_curve(found).axes
+    lines = {str(line.get_label()): np.array(line.get_ydata(), float) for line in axes.lines}
+    wanted = {"best choice found": [1.2, 0.6, 0.4], "bound of any choice": [0.6, 0.4, math.nan]}
+    wanted |= {"as drawn": [1.2, 1.2], "target": [5.7, 5.7]}
+    assert set(lines) == set(wanted)
+    for name, y in wanted.items():
+        np.testing.assert_allclose(lines[name], y)
+    assert list(axes.lines[0].get_xdata()) == [2.0, 4.0, 6.0] and axes.get_ylim()[0] == 0.0
 
 
 def test_without_a_curve_the_positions_are_drawn(found: Campaign, tmp_path: Path) -> None:
