@@ -168,6 +168,7 @@ def test_positions_in_the_volume_are_named_with_a_dot_at_their_first_balls(sheet
     texts = re.findall(r'<text x="(.*?)" y="(.*?)".*?>(.*?)</text>', drawing)
     places = np.array([text[:2] for text in texts], float) - [0.0, 4.0]
     told = [text for *_, text in texts]
+    assert ((places > 0.0) & (places < size)).all()
     assert told[:9] == ["0", "x, mm", "600", "0", "y, mm", "500", "0", "z, mm", "450"]
     for ends in places[:9].reshape(3, 3, 2):
         np.testing.assert_allclose(ends[1], 0.5 * (ends[0] + ends[2]), atol=0.11)

@@ -281,9 +281,10 @@ def test_commands_write_pages(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     bp.simulate(path, seed=1).to_csv(readings, index=False)
     assert main(["fit", path, str(readings), "--report", str(tmp_path / "fit.html")]) == 0
     assert main(["run", path, "--report", str(tmp_path / "design.html")]) == 0
-    results = {"fit": bp.fit(path, readings), "design": bp.run(path)}
+    results = [("fit", bp.fit(path, readings))]
+    results += [("design", one) for one in (path, bp.run(path), bp.check(path))]
     moment = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d UTC")
-    for name, result in results.items():
+    for name, result in results:
         page = (tmp_path / f"{name}.html").read_text(encoding="utf-8")
         assert page.startswith("<!DOCTYPE html>") and "two-dimensions.yaml" in page
         own = bp.page(result, tmp_path / "own.html")
