@@ -131,18 +131,15 @@ def test_axes_of_the_volume_are_told_outside_of_it(lower: Any, upper: Any) -> No
     assert {f"{1e3 * end:g}" for end in (*lower, *upper)} - {"0"} < set(labels.names)
 
 
-@pytest.mark.parametrize("name", ["quickstart", "certified/two-dimensions"])
-def test_positions_of_a_view_are_named_above_their_balls(name: str) -> None:
-    """In a plane among them; styli end at the offset from the ball that is nearest to the middle."""
-    design = bp.check(bp.load(f"designs/{name}.yaml")).design
-    layers = volume_view(design).layers
-    (labels,) = (layer for layer in layers if layer.style == "names")
-    styli = [layer.points for layer in layers if layer.style == "ink fine"]
-    dots = [layer.points for layer in layers if (layer.kind, layer.style) == ("dots", "plate")]
+def test_positions_of_a_view_are_named_above_their_balls() -> None:
+    """And styli end at their ball that is nearest to the middle."""
+    design = bp.check(bp.quickstart()).design
+    layers = {(layer.kind, layer.style): layer for layer in volume_view(design).layers}
+    dots = [one.points for one in volume_view(design).layers if one.style == "plate"][1::2]
+    labels, styli = layers["labels", "names"], layers["lines", "ink fine"].points[::2]
     assert labels.names == design.positions.names
     for place, balls in zip(labels.points, dots, strict=True):
-        above = (place - balls) @ projection(design.dimension)[0][1]
-        is_over = 0.0 < above.min() < 0.2 * np.ptp(above)
-        assert is_over if design.dimension == 3 else above.min() < 0.0 < above.max()
+        above = (place - balls) @ projection(3)[0][1]
+        assert 0.0 < above.min() < 0.2 * np.ptp(above)
         middle = balls[np.linalg.norm(balls - balls.mean(axis=0), axis=1).argmin()]
-        assert not styli or np.isclose(styli[0][::2], middle).all(axis=1).any()
+        assert np.isclose(styli, middle).all(axis=1).any()
