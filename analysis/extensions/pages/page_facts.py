@@ -22,6 +22,14 @@ def target_in_words(experiment: Experiment) -> str:
 def assumptions(experiment: Experiment, parameters: int) -> list[tuple[str, str]]:
     """Return file, error model with its number of `parameters`, repeatability, certificates,
     probes, influence quantities and target.
+
+    >>> import ballplate as bp
+    >>> for name, words in assumptions(bp.quickstart(), 27)[1:5]:
+    ...     print(f"{name}: {words}")
+    Volume: 1000 x 1000 x 1000 mm
+    Error model: kinematic, 27 parameters
+    Repeatability: 0.2 µm (standard uncertainty)
+    Certificates: distances of plate (4)
     """
     sides = zip(*experiment.machine.volume.corners, strict=True)
     volume = " x ".join(f"{1e3 * (high - low):.6g}" for low, high in sides)

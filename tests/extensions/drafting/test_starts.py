@@ -77,7 +77,7 @@ def test_places_cover_the_reach_of_the_tips_in_steps_of_the_plate() -> None:
     """Two or three along an axis, one where the plate has hardly any play; a plane without any is
     refused, before it a plate that is larger than the volume.
     """
-    draws, refused = np.random.default_rng(4), 0
+    draws = np.random.default_rng(4)
     for _ in range(150):
         volume, size = draws.uniform(0.2, 1.5, 3), draws.uniform(0.1, 1.2, 2)
         tips = tips_of(StatedTips("star", None, 0.0), "z", tuple(volume))
@@ -98,15 +98,11 @@ def test_places_cover_the_reach_of_the_tips_in_steps_of_the_plate() -> None:
         except ValueError as error:
             fits = any((size <= two).all() for two in permutations(volume, 2))
             assert ("does not fit" in str(error)) == fits and {one[0] for one in wanted} < {*"xyz"}
-            refused += 1
             continue
-        assert wanted == {
-            (*one["planes"], one["quarter_turns"]): list(
-                map(len, (one["levels"], *one["corners"].values()))
-            )
-            for one in places
-        }
-    assert 20 < refused < 130
+        for one in places:
+            parts = (one["levels"], *one["corners"].values())
+            assert wanted.pop((*one["planes"], one["quarter_turns"])) == [*map(len, parts)]
+        assert not wanted
 
 
 @pytest.mark.parametrize("kind", table("kinds"))
