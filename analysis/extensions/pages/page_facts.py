@@ -24,12 +24,14 @@ def assumptions(experiment: Experiment, parameters: int) -> list[tuple[str, str]
     probes, influence quantities and target.
 
     >>> import ballplate as bp
-    >>> for name, words in assumptions(bp.quickstart(), 27)[1:5]:
+    >>> experiment = bp.load("designs/hurt_foss/bar-bell.yaml", "length known")
+    >>> for name, words in assumptions(experiment, 9)[1:6]:
     ...     print(f"{name}: {words}")
-    Volume: 1000 x 1000 x 1000 mm
-    Error model: kinematic, 27 parameters
-    Repeatability: 0.2 µm (standard uncertainty)
-    Certificates: distances of plate (4)
+    Variant: length known
+    Volume: 1000 x 800 x 600 mm
+    Error model: metric, 9 parameters
+    Repeatability: 1 µm (standard uncertainty)
+    Certificates: distances of bar (1)
     """
     sides = zip(*experiment.machine.volume.corners, strict=True)
     volume = " x ".join(f"{1e3 * (high - low):.6g}" for low, high in sides)

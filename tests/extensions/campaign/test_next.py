@@ -99,10 +99,9 @@ def test_scatter_above_what_is_stated_counts(readings: pandas.DataFrame) -> None
     # Of the residuals, or of the stated uncertainties times what the residuals say.
     lengths = fit.quantities["U6"]
     for one in (found.to_dict(), told.to_dict()):
-        of_lengths = [one["U6_average"], one["U6_maximum"]]
-        assert of_lengths == pytest.approx([lengths.average, lengths.maximum], rel=1e-9)
+        assert one["U6_average"] == pytest.approx(lengths.average, rel=1e-9)
+        assert one["U6_maximum"] == pytest.approx(lengths.maximum, rel=1e-9)
         assert one["why_no_estimate"] is None and one["goal_met"] is False
-        assert one["degrees_of_freedom"] == fit.degrees_of_freedom
 
 
 def test_a_gross_error_is_named_and_stops_nothing(readings: pandas.DataFrame) -> None:

@@ -111,15 +111,12 @@ def _agrees(text: str, value: float) -> bool:
 
 
 def chart_marks(text: str) -> dict[str, np.ndarray]:
-    """Marks of a chart by kind (n, 2), in the numbers of its axes, and the ends of the frame (2, 2),
-    which holds them all.
-    """
+    """Marks of a chart by kind (n, 2) and the frame that holds them (2, 2), in the axes' numbers."""
     label = r'<text x="([-\d.]+)" y="([-\d.]+)" text-anchor="%s">(-?[\d.]+)<'
     across, up = (np.array(re.findall(label % how, text), float) for how in ("middle", "end"))
     of_x, of_y = np.polyfit(across[:, 0], across[:, 2], 1), np.polyfit(up[:, 1] - 3.5, up[:, 2], 1)
-    frame = re.findall(r"M([\d.]+) [\d.]+H([\d.]+)", text)[0]
-    frame = np.array([frame, re.findall(r"M[\d.]+ ([\d.]+)V([\d.]+)", text)[0]], float).T
-    found = {"frame": frame}
+    sides = [re.findall(one, text)[0] for one in (r"M(\S+) \S+H([\d.]+)", r"M\S+ (\S+)V([\d.]+)")]
+    found = {"frame": (frame := np.array(sides, float).T)}
     for kind, path in re.findall(r'<path class="(dots|line|band) [^"]*" d="(M[^"]*)"', text):
         found[kind] = np.array(re.findall(r"([-\d.]+) ([-\d.]+)", path), float)
         assert ((frame[0] <= found[kind]) & (found[kind] <= frame[1])).all() and (frame > 0).all()

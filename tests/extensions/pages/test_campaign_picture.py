@@ -53,9 +53,8 @@ def texts(campaign: Campaign, folder: Path) -> list[str]:
     return re.findall(r"<!-- (.*?) -->", path.read_text(encoding="utf-8"))
 
 
-def test_a_picture_with_a_curve_has_all_that_is_compared(found: Campaign, tmp_path: Path) -> None:
+def test_a_picture_with_a_curve_has_all_that_is_compared(found: Campaign) -> None:
     """In hours, and in micrometres."""
-    assert "hours allowed" in texts(found, tmp_path)
     (axes,) = draw_curve(found).axes
     lines = {str(line.get_label()): np.array(line.get_ydata(), float) for line in axes.lines}
     wanted = {"best choice found": [1.2, 0.6, 0.4], "bound of any choice": [0.6, 0.4, math.nan]}
@@ -64,6 +63,7 @@ def test_a_picture_with_a_curve_has_all_that_is_compared(found: Campaign, tmp_pa
     for name, y in wanted.items():
         np.testing.assert_allclose(lines[name], y)
     assert list(axes.lines[0].get_xdata()) == [2.0, 4.0, 6.0] and axes.get_ylim()[0] == 0.0
+    assert axes.get_xlabel() == "hours allowed"
 
 
 def test_without_a_curve_the_positions_are_drawn(found: Campaign, tmp_path: Path) -> None:

@@ -26,11 +26,7 @@ def figure(layers: list[Layer]) -> str:
 
 
 def path_of(picture: str, kind: str) -> str:
-    found = re.search(rf'<path class="{kind}[^"]*" d="([^"]*)"', picture) or re.search(
-        rf'<path class="{kind}[^"]*"[^>]* d="([^"]*)"', picture
-    )
-    assert found is not None
-    return found[1]
+    return re.findall(rf'<path class="{kind}[^"]*" d="([^"]*)"', picture)[0]
 
 
 @pytest.mark.parametrize(
@@ -89,24 +85,18 @@ def test_a_view_shows_points_as_the_projection_of_still_pictures(dimension: int)
     np.testing.assert_allclose(
         shown - shown.mean(axis=0), scale[0] * (flat - flat.mean(axis=0)), atol=0.2
     )
-    # As large as the room within the margin lets it be.
     room = np.concatenate([shown.min(axis=0) - 30.0, [450.0, 330.0] - shown.max(axis=0)])
     assert room.min() == pytest.approx(0.0, abs=0.11)
 
 
-@pytest.mark.parametrize(
-    ("lower", "upper"),
-    [
-        ([0.0, 0.0, 0.0], [0.9, 1.2, 0.7]),
-        ([-0.5, 0.1, -0.2], [0.4, 0.6, 0.3]),
-        ([0.1, -0.2], [0.5, 0.3]),
-    ],
-)
+BOXES = ([0.0, 0.0, 0.0], [0.9, 1.2, 0.7]), ([-0.5, 0.1, -0.2], [0.4, 0.6, 0.3])
+
+
+@pytest.mark.parametrize(("lower", "upper"), [*BOXES, ([0.1, -0.2], [0.5, 0.3])])
 def test_axes_of_the_volume_are_told_outside_of_it(lower: Any, upper: Any) -> None:
     """Ticks leave the edge at their number at right angles on paper, names are beyond the ends."""
+    d, size, design = len(lower), np.subtract(upper, lower).max(), Mock()
     lower, upper = np.array(lower), np.array(upper)
-    d, size = len(lower), (upper - lower).max()
-    design: Any = Mock()
     design.machine.volume.lower, design.machine.volume.upper = lower, upper
     *edges, strokes, origin, labels = volume_layers(design)
     view, _ = projection(d)
@@ -118,7 +108,6 @@ def test_axes_of_the_volume_are_told_outside_of_it(lower: Any, upper: Any) -> No
     pairs = pairs[is_short & ((pairs[:, 0] >= lower) & (pairs[:, 0] <= upper)).all(axis=1)]
     for name, place in zip(labels.names, labels.points, strict=True):
         away = place @ view.T - corners
-        # To the right of some side of the outline, which turns to the left.
         assert (sides[:, 0] * away[:, 1] - sides[:, 1] * away[:, 0]).min() < 0.0, name
         if name[0] in "xyz":
             k = "xyz".index(name[0])

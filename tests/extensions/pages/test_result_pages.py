@@ -15,7 +15,6 @@ import pytest
 from ballplate.cli import main
 from ballplate.extensions.maps.length_map import length_map
 from ballplate.extensions.pages.design_contents import page_of_design
-from ballplate.extensions.pages.page_facts import assumptions
 
 from tests.extensions.certificates.campaigns import IN_SPACE
 from tests.extensions.pages import wording
@@ -165,12 +164,11 @@ def test_the_map_has_bands_of_the_share_of_lengths_that_miss_the_target(met: str
     found, by_point = [], length_map(changed, (5, 5, 5)).to_dict()["by_point"]
     for part in re.findall(r'<svg class="map".*?</svg>', page):
         labels = re.findall(rf'<text x={number} y={number} text-anchor="(\w+)">([^<]*)<', part)
-        wide, high = map(float, re.findall(r'viewBox="0 0 (\S+) (\S+)"', part)[0])
         across = {text: float(x) for x, _, anchor, text in labels if anchor == "middle"}
         up = {text: float(y) for _, y, anchor, text in labels if anchor == "end"}
         for band, *of_cell, k, value in re.findall(places, part):
             left, top, width, height, x, y = map(float, of_cell)
-            assert left + width / 2 == x and left + width < wide and top + height < high
+            assert left + width / 2 == x
             x_told, y_told = (f"{1e3 * one:.5g}" for one in by_point[int(k)]["point"][:2])
             assert (x, y) == (across[x_told], up[y_told]) and y == top + height / 2 + 3.5
             found.append((int(band), float(value)))
@@ -180,11 +178,9 @@ def test_the_map_has_bands_of_the_share_of_lengths_that_miss_the_target(met: str
     if met == "no target":
         limits = np.linspace(values.min(), values.max(), 8)
         limits[0] = 0.0
-    assert (
-        (limits[bands] * (1 - 1e-6) < values) & (values <= limits[bands + 1] * (1 + 1e-6))
-    ).all()
-    some = len(set(bands)) > 2
-    assert {"all": set(bands) == {0}, "none": set(bands) == {6}}.get(met, some)
+    assert (limits[bands] * (1 - 1e-6) < values).all()
+    assert (values <= limits[bands + 1] * (1 + 1e-6)).all()
+    assert {"all": set(bands) == {0}, "none": set(bands) == {6}}.get(met, len(set(bands)) > 2)
     (legend,) = re.findall(r'<ul class="legend bands">(.*?)</ul>', page)
     entries = re.findall(r'<span class="swatch band-(\d)"[^>]*></span>([^<]*)', legend)
     texts = ["0 %", *(f"up to {k} %" for k in (5, 10, 25, 50, 75)), "more than 75 %"]
@@ -230,16 +226,6 @@ def test_a_page_runs_no_script_and_asks_for_nothing(page: str) -> None:
     asked = [one.get("src") or one.get("href", "") for _, one in ResultPage(page).tags]
     assert all(one.startswith(("#", "data:,")) for one in asked if one)
     assert "url(" not in page and "@import" not in page
-
-
-def test_facts_of_a_page_are_what_the_file_states() -> None:
-    """A plane of 32 by 17 inches, with a repeatability of a microinch; nothing for what is absent."""
-    real = bp.load("designs/hocken_borchardt/real.yaml", "with scale")
-    facts = dict(assumptions(replace(real, description="two\n lines"), 7))
-    assert facts["Variant"] == "with scale" and facts["Description"] == "two lines"
-    assert facts["Volume"] == "812.8 x 431.8 mm" and facts["Target"] == "none is stated"
-    assert facts["Repeatability"].startswith("0.0254 µm")
-    assert not {"Variant", "Description"} & set(dict(assumptions(bp.quickstart(), 7)))
 
 
 def test_a_fit_that_fails_has_a_page_that_says_so(fitted: bp.Fit) -> None:

@@ -57,9 +57,8 @@ def test_fit_draws_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
     for name, estimator in (("full.svg", "full"), ("reversal.svg", "reversal")):
         assert main(["fit", *REAL, "--estimator", estimator, "--plot", str(tmp_path / name)]) == 0
         drawn = (tmp_path / name).read_text()
-        bp.fit(bp.load(REAL[0], REAL[-1]), REAL[1], estimator=estimator).plot(
-            tmp_path / "method.svg"
-        )
+        found = bp.fit(bp.load(REAL[0], REAL[-1]), REAL[1], estimator=estimator)
+        found.plot(tmp_path / "method.svg")
         assert "magnified" in drawn and drawn == (tmp_path / "method.svg").read_text()
         # Ball 13, which the documentation speaks of, can be found.
         assert drawn.count("<!-- 13 -->") == (2 if estimator == "full" else 1)

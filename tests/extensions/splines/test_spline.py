@@ -116,9 +116,7 @@ def test_coefficients_for_a_controller(
 
 
 def test_drawings(tmp_path: Path) -> None:
-    """All that is drawn is that of the JSON in millimetres and micrometres; bars are normal to the
-    profile and within the frame.
-    """
+    """All that is drawn is that of the JSON in millimetres and micrometres, within the frame."""
     plot, bars = tmp_path / "fit.svg", tmp_path / "whiskers.svg"
     assert run(PART, "--y", "semi_finish_error", "--plot", plot, "--whiskers", bars) == 0
     curve = bp.spline(PART, y="semi_finish_error", boundary=[TANGENT])
@@ -126,10 +124,8 @@ def test_drawings(tmp_path: Path) -> None:
     lines = {str(line.get_label()): np.array(line.get_xydata()) for line in axes.lines}
     x, y = np.array([[point["x"] * 1e3, point["y"] * 1e6] for point in found["points"]]).T
     knots = np.setdiff1d(found["knots"], found["boundaries"])
-    np.testing.assert_allclose(lines["measured"], np.stack([x, y], axis=1))
-    np.testing.assert_allclose(
-        lines["knots"].T, [1e3 * knots, 1e6 * curve.values(knots)], rtol=1e-9
-    )
+    np.testing.assert_allclose(lines["measured"].T, [x, y])
+    np.testing.assert_allclose(lines["knots"].T, [1e3 * knots, 1e6 * curve.values(knots)])
     assert lines["boundary of features"][:, 0] / 1e3 == pytest.approx(found["boundaries"] * 2)
     spline = lines["spline"]
     low, high = (spline[k(spline[:, 1])] for k in (np.argmin, np.argmax))
@@ -151,14 +147,14 @@ def test_the_text_tells_what_the_json_has() -> None:
     found, text = curve.to_dict(), str(curve)
     knots = [f"{1e3 * knot:.6g}" for knot in found["knots"]]
     assert f"{len(knots)} knots at {', '.join(knots[:12])} mm and {len(knots) - 12} more;" in text
-    for line, piece in zip(
-        text.splitlines()[-len(found["pieces"]) :], found["pieces"], strict=True
-    ):
-        told = [float(number) for number in line.split()]
-        factors = 1e6 * 1e-3 ** np.arange(4)
-        wanted = [1e3 * piece["start"], 1e3 * piece["end"], *(factors * piece["coefficients"])]
-        assert told[:5] == pytest.approx(wanted[:5], rel=1e-5)
+    lines, pieces = text.splitlines(), found["pieces"]
+    for line, piece in zip(lines[-len(pieces) :], pieces, strict=True):
+        ends, (c0, c1, c2, _) = [piece["start"], piece["end"]], piece["coefficients"]
+        wanted = [*np.multiply(ends, 1e3), 1e6 * c0, 1e3 * c1, c2]
+        assert [float(told) for told in line.split()[:5]] == pytest.approx(wanted, rel=1e-5)
     assert f"{found['coverage_factor']:.3g} times that for 95 %" in text
+    told = [str(bp.spline(PART, y="semi_finish_error", boundary=one)) for one in ([], [TANGENT])]
+    assert ["makes no boundaries" in one for one in told] == [True, False]
 
 
 @pytest.mark.parametrize(
