@@ -75,6 +75,9 @@ def table(
     """Return a table; the columns `words` are texts, all others numbers.
 
     `name` is an id, unique on the page; a table that `is_long` scrolls separately on screens.
+
+    >>> [table("a", "", [""] * count, []).split('"')[1] for count in (11, 12)]
+    ['scroll', 'scroll wide']
     """
     texts = set(words)
     head = joined(
@@ -110,7 +113,11 @@ def scrolling(
 
 
 def _width(content: str) -> str:
-    """Return the class of a long text, which may wrap."""
+    """Return the class of a long text, which may wrap.
+
+    >>> _width("a" * 41), _width("a" * 40), _width(Html(f"<b>{'a' * 16}</b>"))
+    ('long', 'some', '')
+    """
     shown = len(re.sub("<[^>]*>", "", content) if isinstance(content, Html) else content)
     return "long" if shown > 40 else "some" if shown > 16 else ""
 

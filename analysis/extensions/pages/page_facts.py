@@ -22,6 +22,16 @@ def target_in_words(experiment: Experiment) -> str:
 def assumptions(experiment: Experiment, parameters: int) -> list[tuple[str, str]]:
     """Return file, error model with its number of `parameters`, repeatability, certificates,
     probes, influence quantities and target.
+
+    >>> import ballplate as bp
+    >>> experiment = bp.load("designs/hurt_foss/bar-bell.yaml", "length known")
+    >>> for name, words in assumptions(experiment, 9)[1:6]:
+    ...     print(f"{name}: {words}")
+    Variant: length known
+    Volume: 1000 x 800 x 600 mm
+    Error model: metric, 9 parameters
+    Repeatability: 1 µm (standard uncertainty)
+    Certificates: distances of bar (1)
     """
     sides = zip(*experiment.machine.volume.corners, strict=True)
     volume = " x ".join(f"{1e3 * (high - low):.6g}" for low, high in sides)

@@ -96,6 +96,12 @@ def test_scatter_above_what_is_stated_counts(readings: pandas.DataFrame) -> None
     assert told.sigma == pytest.approx(fit.sigma, rel=1e-9) and not told.is_met
     assert told.now is not None and found.now is not None
     assert told.now.distance == pytest.approx(found.now.distance, rel=1e-9)
+    # Of the residuals, or of the stated uncertainties times what the residuals say.
+    lengths = fit.quantities["U6"]
+    for one in (found.to_dict(), told.to_dict()):
+        assert one["U6_average"] == pytest.approx(lengths.average, rel=1e-9)
+        assert one["U6_maximum"] == pytest.approx(lengths.maximum, rel=1e-9)
+        assert one["why_no_estimate"] is None and one["goal_met"] is False
 
 
 def test_a_gross_error_is_named_and_stops_nothing(readings: pandas.DataFrame) -> None:
@@ -170,6 +176,10 @@ def test_the_order_of_readings_within_a_position_does_not_matter(
 def test_an_interrupted_position_is_completed_first(readings: pandas.DataFrame) -> None:
     found = judged(readings.iloc[:13])
     line = found.lines()[0]
+    data = found.to_dict()
+    assert {data[f"U6_{name}"] for name in ("average", "maximum")} == {data["sigma"]} == {None}
+    assert data["goal_met"] is False and data["degrees_of_freedom"] is None
+    assert data["why_no_estimate"] == found.why != "" and data["next"] == "z low"
     assert found.fit is None and wording.NOTHING_CAN_BE_ESTIMATED_YET in found.lines()[2]
     assert "next: rest of z low (12 readings)" in line and not found.is_met
     later = judged(pandas.concat([readings.iloc[:100], readings.iloc[100:115]]))

@@ -11,15 +11,12 @@ import pytest
 from ballplate.cli import main
 from ballplate.extensions.drafting.data_sheet import data_sheet
 from ballplate.extensions.drafting.draft import draft
-from ballplate.extensions.drafting.machine_tables import table
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.settings import build_error_model
 from ballplate.simulator.machines.true_machine_settings import RandomSettings
 from ballplate.simulator.machines.truth import true_parameters
-from hypothesis import Phase, given, settings
-from hypothesis import strategies as st
 
 from tests.extensions.drafting import wording
 from tests.extensions.drafting.sheets import BRIDGE, FLAT, SHEETS, furthest, options, spans, whole
@@ -58,53 +55,23 @@ def test_the_printed_command_runs(
     assert main(["check", "m-chosen.yaml"]) == 0
 
 
-@pytest.mark.parametrize(
-    ("arrangement", "tips"),
-    [(one, ("one", "head", "star")[k % 3]) for k, one in enumerate(ARRANGEMENTS)],
-)
-def test_every_arrangement_has_full_rank(arrangement: str, tips: str) -> None:
-    text = drafted(BRIDGE, machine_type=arrangement, tips=tips)
-    (experiment,) = load(Path("drafted.yaml"), text=text)
-    assert bp.check(experiment).verdict.deficiency == 0
-    assert furthest(experiment) < 1e-9
-    if tips == "one":
-        # What is left out is not determined by a single tip.
-        every = whole(text).with_({"error_model.functions": None})
-        assert bp.check(every).verdict.deficiency > 0
-
-
-# Without shrinking, which takes minutes: each example is laid out as a whole.
-@settings(max_examples=8, deadline=None, phases=[Phase.generate])
-@given(
-    kind=st.sampled_from([*table("kinds"), *ARRANGEMENTS]),
-    edges=st.tuples(*[st.integers(200, 4000)] * 3),
-    shares=st.tuples(*[st.floats(0.3, 1.0)] * 2),
-    balls=st.tuples(*[st.integers(4, 7)] * 2),
-    tips=st.sampled_from(["one", "star", "head"]),
-)
-def test_any_machine(
-    kind: str,
-    edges: tuple[int, int, int],
-    shares: tuple[float, float],
-    balls: tuple[int, int],
-    tips: str,
-) -> None:
-    """Either refused by the plate's size, or valid, of full rank and within the volume."""
-    size = [f"{round(0.8 * min(edges) * share, 1)}" for share in shares]
-    stated = {
-        "machine_type": kind,
-        "volume": " x ".join(map(str, edges)) + " mm",
-        "plate": f"{balls[0]} x {balls[1]}, {' x '.join(size)} mm",
-        "tips": tips,
-    }
-    try:
-        text = drafted(BRIDGE, **stated)
-    except ValueError as error:
-        assert tips == "one" and "does not fit" in str(error)
-        return
-    (experiment,) = load(Path("drafted.yaml"), text=text)
-    assert bp.check(experiment).verdict.deficiency == 0
-    assert furthest(whole(text)) < 1e-9
+@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
+def test_every_arrangement_has_full_rank(arrangement: str) -> None:
+    """With a volume, a plate and tips of any size and form, in two dimensions as well."""
+    k = list(ARRANGEMENTS).index(arrangement)
+    draws, tips = np.random.default_rng(k), ("one", "head", "star")[k % 3]
+    edges = draws.integers(200, 4000, 3)
+    size = " x ".join(f"{side:.1f}" for side in edges.min() * draws.uniform(0.25, 0.5, 2))
+    plate = f"{draws.integers(4, 7)} x {draws.integers(4, 7)}, {size} mm"
+    stated = {"volume": " x ".join(map(str, edges)) + " mm", "plate": plate}
+    text = drafted(BRIDGE | stated, machine_type=arrangement, tips=tips)
+    (experiment,), every = load(Path("drafted.yaml"), text=text), whole(text)
+    assert bp.check(experiment).verdict.deficiency == 0 and furthest(every) < 1e-9
+    flat = bp.design(**FLAT | {"machine_type": arrangement})
+    assert bp.check(flat).verdict.deficiency == 0 and flat.dimension == 2
+    # What is left out is not determined by a single tip, or in a plane.
+    for one in (every, flat) if tips == "one" else (flat,):
+        assert bp.check(one.with_({"error_model.functions": None})).verdict.deficiency > 0
 
 
 def test_what_a_file_states_is_the_data_sheet() -> None:
@@ -146,6 +113,11 @@ def test_stated_values() -> None:
     text = drafted(BRIDGE, repeatability="0.25 um", tips="head, 200 mm, 0.3 um")
     assert "repeatability: 0.25 um" in text and "tip: [0 mm, 0 mm, -200 mm]" in text
     assert text.count("standard_uncertainty: 0.3 um}") == 4
+    design = bp.design(**BRIDGE, repeatability="0.25 um", target="0.7 um, k=3", tips="star, 40 mm")
+    assert np.allclose(design.machine.repeatability, 0.25e-6)
+    assert np.abs(design.probes["right"].offset).max() == 0.04
+    target = design.target_uncertainty
+    assert target is not None and (target.at(1.0), target.coverage_factor) == (0.7e-6 / 3, 3.0)
 
 
 @pytest.mark.parametrize("name", SHEETS)
@@ -158,14 +130,6 @@ def test_a_choice_has_three_positions_of_two_planes(name: str) -> None:
     few += [[candidates[i] for i in generator.permutation(len(candidates))[:2]] for _ in range(5)]
     for chosen in few:
         assert bp.check(with_chosen(every, chosen)).verdict.deficiency > 0
-
-
-def test_a_plate_that_is_not_square() -> None:
-    """It is placed along both axes of each plane where it has room, and else along one."""
-    every = whole(drafted(BRIDGE, plate="7 x 4, 660 x 330 mm"))
-    assert furthest(every) < 1e-9 and bp.check(every).verdict.deficiency == 0
-    across = {name: sum(one.name.startswith(name) for one in every.positions) for name in "xyz"}
-    assert across["z"] > across["x"] > 0
 
 
 @pytest.mark.parametrize("name", SHEETS)

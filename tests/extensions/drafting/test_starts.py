@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from itertools import permutations, product
 from pathlib import Path
 
 import ballplate as bp
+import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.simulator.machines import ARRANGEMENTS
+from ballplate.extensions.drafting.machine_tables import table
+from ballplate.extensions.drafting.places import places_of, tips_of
+from ballplate.extensions.drafting.shapes import VIEW, machine_shapes
+from ballplate.extensions.drafting.sheet_values import Plate, StatedTips
 
 from tests.extensions.drafting.sheets import BRIDGE, FLAT, options
 
@@ -68,10 +73,47 @@ def test_features_of_every_draft_differ(
     assert main(["fit", "m.yaml", "readings.csv", "-q"]) == 0
 
 
-@pytest.mark.parametrize("arrangement", ARRANGEMENTS)
-def test_two_dimensions_have_full_rank(arrangement: str) -> None:
-    experiment = bp.design(**FLAT | {"machine_type": arrangement})
-    assert experiment.dimension == 2
-    assert bp.check(experiment).verdict.deficiency == 0
-    whole = experiment.with_({"error_model.functions": None})
-    assert bp.check(whole).verdict.deficiency > 0
+def test_places_cover_the_reach_of_the_tips_in_steps_of_the_plate() -> None:
+    """Two or three along an axis, one where the plate has hardly any play; a plane without any is
+    refused, before it a plate that is larger than the volume.
+    """
+    draws = np.random.default_rng(4)
+    for _ in range(150):
+        volume, size = draws.uniform(0.2, 1.5, 3), draws.uniform(0.1, 1.2, 2)
+        tips = tips_of(StatedTips("star", None, 0.0), "z", tuple(volume))
+        assert tips.length == pytest.approx(min(0.06, volume.min() / 10), abs=1e-4)
+        wanted: dict[object, list[int]] = {}
+        for plane, turn in product("xyz", (0, 1)):
+            # Two tips on either side, a length lower than the centre, or one that hangs by two.
+            reach = dict(zip("xyz", volume, strict=True))
+            reach[plane] -= 2 * tips.length
+            reach["z"] -= 0 if plane == "z" else tips.length
+            sides = dict(zip(IN_PLANE[plane], size[::-1] if turn else size, strict=True))
+            if all(side <= reach[axis] for axis, side in sides.items()):
+                ratios = [reach[axis] / side for axis, side in sides.items()]
+                corners = [1 if one < 1.1 else 2 + (one > 2) for one in ratios]
+                wanted[plane, turn] = [2 + (reach[plane] > size.min()), *corners]
+        try:
+            places = list(places_of(Plate(4, 4, tuple(size)), tips, tuple(volume)))
+        except ValueError as error:
+            fits = any((size <= two).all() for two in permutations(volume, 2))
+            assert ("does not fit" in str(error)) == fits and {one[0] for one in wanted} < {*"xyz"}
+            continue
+        for one in places:
+            parts = (one["levels"], *one["corners"].values())
+            assert wanted.pop((*one["planes"], one["quarter_turns"])) == [*map(len, parts)]
+        assert not wanted
+
+
+@pytest.mark.parametrize("kind", table("kinds"))
+def test_boxes_of_a_machine_show_the_sides_that_face_the_eye(kind: str) -> None:
+    """Each three rectangles with a common corner, the near one."""
+    (away,) = np.linalg.svd(VIEW.T)[2][2:]
+    away *= np.sign(away[1])
+    sides = [shape.points for shape in machine_shapes(kind) if len(shape.points) == 4]
+    for box in np.array(sides).reshape(-1, 3, 4, 3):
+        corners = np.unique(box.reshape(-1, 3), axis=0)
+        nearest = corners[(corners @ away).argmin()]
+        for side in box:
+            np.testing.assert_allclose(side[1] - side[0], side[2] - side[3], atol=1e-12)
+            assert len(np.unique(side, axis=0)) == 4 and (side == nearest).all(axis=1).any()

@@ -8,7 +8,11 @@ from dataclasses import dataclass
 from html.parser import HTMLParser
 from typing import Any
 
+import numpy as np
+
 VOID = {"meta", "link", "br", "img", "input"}
+# What lengths, temperatures, shares, angles and expanded uncertainties in SI units are shown times.
+FACTORS = (1.0, 1e2, 1e3, 2e3, 1e6, 2e6, 180 * 3600 / np.pi)
 
 
 @dataclass
@@ -82,10 +86,10 @@ def assert_quoted(text: str, data: Mapping[str, Any]) -> int:
             assert stated is None and one.text == "undetermined", one
             continue
         assert stated is not None and float(stated) == value, one
-        assert _agrees(one.text, value * float(one.attributes.get("data-factor", "1"))), (
-            one,
-            value,
-        )
+        factor = float(one.attributes.get("data-factor", "1"))
+        assert _agrees(one.text, value * factor) and factor in FACTORS, (one, value)
+        # What is as small as metres are is shown in micrometres.
+        assert "e-" not in one.text or re.search("p_value|step", one.attributes["data-path"]), one
     for attributes, text in page.cells:
         assert "words" in attributes.get("class", "") or not re.search(r"\d", text), text
     return len(page.shown)
@@ -104,3 +108,19 @@ def _agrees(text: str, value: float) -> bool:
     if number != text:
         return -1e-9 <= off < 0.01 + 1e-9
     return abs(off) <= 0.5000001 * last
+
+
+def chart_marks(text: str) -> dict[str, np.ndarray]:
+    """Marks of a chart by kind (n, 2) and the frame that holds them (2, 2), in the axes' numbers."""
+    label = r'<text x="([-\d.]+)" y="([-\d.]+)" text-anchor="%s">(-?[\d.]+)<'
+    across, up = (np.array(re.findall(label % how, text), float) for how in ("middle", "end"))
+    of_x, of_y = np.polyfit(across[:, 0], across[:, 2], 1), np.polyfit(up[:, 1] - 3.5, up[:, 2], 1)
+    sides = [re.findall(one, text)[0] for one in (r"M(\S+) \S+H([\d.]+)", r"M\S+ (\S+)V([\d.]+)")]
+    found = {"frame": (frame := np.array(sides, float).T)}
+    for kind, path in re.findall(r'<path class="(dots|line|band) [^"]*" d="(M[^"]*)"', text):
+        found[kind] = np.array(re.findall(r"([-\d.]+) ([-\d.]+)", path), float)
+        assert ((frame[0] <= found[kind]) & (found[kind] <= frame[1])).all() and (frame > 0).all()
+    return {
+        kind: np.stack([np.polyval(of_x, x), np.polyval(of_y, y)], axis=1)
+        for kind, (x, y) in ((kind, marks.T) for kind, marks in found.items())
+    }

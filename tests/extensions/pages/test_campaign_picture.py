@@ -7,6 +7,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from ballplate.extensions.campaign.campaign_picture import draw_curve
 from ballplate.planning.constraints import Budget, Spent
@@ -52,16 +53,17 @@ def texts(campaign: Campaign, folder: Path) -> list[str]:
     return re.findall(r"<!-- (.*?) -->", path.read_text(encoding="utf-8"))
 
 
-def test_a_picture_with_a_curve_has_all_that_is_compared(found: Campaign, tmp_path: Path) -> None:
-    drawn = texts(found, tmp_path)
-    for text in (
-        "best choice found",
-        "bound of any choice",
-        "as drawn",
-        "target",
-        "hours allowed",
-    ):
-        assert text in drawn
+def test_a_picture_with_a_curve_has_all_that_is_compared(found: Campaign) -> None:
+    """In hours, and in micrometres."""
+    (axes,) = draw_curve(found).axes
+    lines = {str(line.get_label()): np.array(line.get_ydata(), float) for line in axes.lines}
+    wanted = {"best choice found": [1.2, 0.6, 0.4], "bound of any choice": [0.6, 0.4, math.nan]}
+    wanted |= {"as drawn": [1.2, 1.2], "target": [5.7, 5.7]}
+    assert set(lines) == set(wanted)
+    for name, y in wanted.items():
+        np.testing.assert_allclose(lines[name], y)
+    assert list(axes.lines[0].get_xdata()) == [2.0, 4.0, 6.0] and axes.get_ylim()[0] == 0.0
+    assert axes.get_xlabel() == "hours allowed"
 
 
 def test_without_a_curve_the_positions_are_drawn(found: Campaign, tmp_path: Path) -> None:
@@ -78,17 +80,7 @@ def test_what_is_undetermined_or_missing_is_not_drawn(found: Campaign, tmp_path:
 
 
 def test_a_ratio_has_no_unit(found: Campaign, tmp_path: Path) -> None:
-    ratio = replace(
-        found,
-        criterion="condition",
-        unit="1",
-        value=310.0,
-        bound=math.nan,
-        drawn=900.0,
-        target=None,
-    )
-    ratio = replace(
-        ratio, curve=tuple(replace(point, value=1e3, bound=math.nan) for point in ratio.curve)
-    )
-    drawn = texts(ratio, tmp_path)
-    assert "best choice found" in drawn and not any("µm" in text for text in drawn)
+    ratio = replace(found, criterion="condition", unit="1", drawn=900.0, target=None)
+    assert not any("µm" in text for text in texts(ratio, tmp_path))
+    (line,) = (one for one in draw_curve(ratio).axes[0].lines if one.get_label() == "as drawn")
+    assert set(np.array(line.get_ydata())) == {900.0}

@@ -11,7 +11,6 @@ from pathlib import Path
 import ballplate as bp
 import numpy as np
 import pytest
-from ballplate.cli import main
 from ballplate.results.fits import Fit
 
 from tests.extensions.pages import wording
@@ -32,24 +31,6 @@ PLACES = {
 @pytest.fixture(scope="module")
 def planar() -> Fit:
     return bp.fit(bp.load(REAL[0], "with scale"), REAL[1])
-
-
-def test_a_figure_is_the_picture_of_the_command(planar: Fit, tmp_path: Path) -> None:
-    """The same bytes from the method, and from the figure that it gives back when a notebook shows
-    it.
-    """
-    arguments = [
-        "fit",
-        *map(str, REAL),
-        "--variant",
-        "with scale",
-        "--plot",
-        str(tmp_path / "command.svg"),
-    ]
-    assert main(arguments) == 0
-    figure = planar.plot(tmp_path / "method.svg")
-    assert (tmp_path / "method.svg").read_bytes() == (tmp_path / "command.svg").read_bytes()
-    assert "magnified" in str(figure.get_label())
 
 
 def test_vectors_begin_where_balls_were_read(planar: Fit) -> None:

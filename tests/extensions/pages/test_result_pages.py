@@ -18,7 +18,7 @@ from ballplate.extensions.pages.design_contents import page_of_design
 
 from tests.extensions.certificates.campaigns import IN_SPACE
 from tests.extensions.pages import wording
-from tests.extensions.pages.pages_read import ResultPage, assert_quoted
+from tests.extensions.pages.pages_read import ResultPage, assert_quoted, chart_marks
 
 # Names that mean something in HTML.
 NAMES = ("z <low> & \"a\" 'b'", "</script><img src=x>", "--> <svg onload=x>", "right")
@@ -87,25 +87,31 @@ def test_every_figure_of_a_fits_page_is_that_of_the_json(
         assert f"/fit/{path}" in quoted
     for name in fitted.to_dict()["estimates"]:
         assert f"/fit/estimates/{name}/value" in quoted
+    curves = fitted.to_dict()["error_functions"]
+    for k, curve in enumerate(curves):
+        largest = int(np.abs(np.array(curve["values"], float)).argmax())
+        assert f"/fit/error_functions/{k}/values/{largest}" in quoted
+    drawn = re.findall(r'<svg class="chart".*?</svg>', page)[: len(curves)]
+    for curve, picture in zip(curves, drawn, strict=True):
+        values, u = 1e6 * np.array([curve["values"], curve["standard_uncertainties"]])
+        x, marks = 1e3 * np.array(curve["positions"]), chart_marks(picture)
+        band = np.array([[*x, *x[::-1]], [*values - 2 * u, *(values + 2 * u)[::-1]]]).T
+        span = 3e-3 * np.abs(np.diff(marks["frame"], axis=0))
+        assert (np.abs(marks["line"] - np.array([x, values]).T) < span).all()
+        assert (np.abs(marks["band"] - band) < span).all()
 
 
-def test_a_page_in_two_dimensions_has_plates_and_no_curves() -> None:
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_pages_have_plates_in_a_plane_and_adjustments_in_space(dimension: int) -> None:
+    """In two dimensions without curves; angles in seconds of arc, scales in parts per million."""
     experiment = bp.load("designs/certified/two-dimensions.yaml")
+    if dimension == 3:
+        experiment = bp.experiment({**IN_SPACE, "error_model": {"kind": "metric"}})
     fit = bp.fit(experiment, bp.simulate(experiment, seed=1))
-    page = fit.page()
-    assert_quoted(page, {"fit": fit.to_dict(), "reliability": bp.reliability(experiment).to_dict()})
-    assert 'id="plate"' in page and 'id="curves"' not in page
-
-
-def test_adjustments_are_shown_in_seconds_of_arc_and_parts_per_million() -> None:
-    experiment = bp.experiment({**IN_SPACE, "error_model": {"kind": "metric"}})
-    fit = bp.fit(experiment, bp.simulate(experiment, seed=1))
-    shown = {one.attributes["data-path"]: one.text for one in ResultPage(fit.page()).shown}
-    assert len(fit.adjustments) == 6
-    for one in fit.adjustments:
-        factor = 180 * 3600 / np.pi if one.unit == "rad" else 1e6
-        figure = float(shown[f"/fit/adjustments/{one.name}/value"].replace("\N{MINUS SIGN}", "-"))
-        assert figure == pytest.approx(factor * one.value, rel=0.01)
+    data = {"fit": fit.to_dict(), "reliability": bp.reliability(experiment).to_dict()}
+    assert_quoted(fit.page(), data)
+    assert 'id="plate"' in fit.page() and 'id="curves"' not in fit.page()
+    assert fit.page().count(">arcsec<") == (3 if dimension == 3 else 0)
 
 
 @pytest.mark.parametrize("variant", ["deficient", "no target", "k = 2", "plane"])
@@ -127,12 +133,15 @@ def test_every_figure_of_a_designs_page_is_that_of_the_json(variant: str) -> Non
     assert ('class="verdict bad"' in page) == is_deficient
     shown = {one.text for one in ResultPage(page).shown}
     assert shown.issuperset(data["run"]["undetermined"])
+    heat = re.findall(r'class="part heat-(\d)"><data value="([-+.\de]+)"', page)
+    assert all(int(one) == min(int(8 * float(part)), 7) for one, part in heat)
 
 
-@pytest.mark.parametrize("met", ["some", "all", "none"])
+@pytest.mark.parametrize("met", ["some", "all", "none", "no target"])
 def test_the_map_has_bands_of_the_share_of_lengths_that_miss_the_target(met: str) -> None:
     """Colours and legend are those of the same bounds, whatever is missed; the first band holds
-    the points whose lengths all meet the target.
+    the points whose lengths all meet the target. Without a target, bands of equal width have the
+    largest uncertainties. Each value stands in its cell, at the co-ordinates of its point.
     """
     experiment = small()
     of_one = experiment.with_(target_uncertainty="1 um", coverage_factor=1)
@@ -142,23 +151,43 @@ def test_the_map_has_bands_of_the_share_of_lengths_that_miss_the_target(met: str
         "all": 2 * largest.max(),
         "none": largest.min() / 5,
     }
-    target = {"target_uncertainty": f"{limit[met]:.6g} um", "coverage_factor": 1}
-    changed = experiment.with_(**target)
+    changed = experiment.with_(target_uncertainty=None)
+    if met != "no target":
+        changed = experiment.with_(target_uncertainty=f"{limit[met]:.6g} um", coverage_factor=1)
     page = page_of_design(changed, bp.run(changed))
+    number = r'"([-\d.]+)"'
     places = (
-        r'<rect class="band-(\d)"[^>]*/><text class="place on-band-\1"[^>]*data-value="([^"]+)"'
+        rf'<rect class="band-(\d)" x={number} y={number} width={number} height={number}/><text'
+        rf' class="place on-band-\1" x={number} y={number} [^>]*by_point/(\d+)/[^>]*'
+        r'data-value="([^"]+)"'
     )
-    found = re.findall(places, page)
-    bands = np.array([int(band) for band, _ in found])
-    shares = np.array([float(value) for _, value in found])
-    assert len(found) > 20
-    below = np.array([-1.0, 0.0, 0.05, 0.1, 0.25, 0.5, 0.75])
-    above = np.array([0.0, 0.05, 0.1, 0.25, 0.5, 0.75, 1.0])
-    assert ((below[bands] < shares) & (shares <= above[bands])).all()
-    assert {"all": set(bands) == {0}, "none": set(bands) == {6}, "some": len(set(bands)) > 2}[met]
+    found, by_point = [], length_map(changed, (5, 5, 5)).to_dict()["by_point"]
+    for part in re.findall(r'<svg class="map".*?</svg>', page):
+        labels = re.findall(rf'<text x={number} y={number} text-anchor="(\w+)">([^<]*)<', part)
+        across = {text: float(x) for x, _, anchor, text in labels if anchor == "middle"}
+        up = {text: float(y) for _, y, anchor, text in labels if anchor == "end"}
+        for band, *of_cell, k, value in re.findall(places, part):
+            left, top, width, height, x, y = map(float, of_cell)
+            assert left + width / 2 == x
+            x_told, y_told = (f"{1e3 * one:.5g}" for one in by_point[int(k)]["point"][:2])
+            assert (x, y) == (across[x_told], up[y_told]) and y == top + height / 2 + 3.5
+            found.append((int(band), float(value)))
+    bands, values = (np.array(one) for one in zip(*found, strict=True))
+    assert len(found) == len(largest)
+    limits = np.array([-1.0, 0.0, 0.05, 0.1, 0.25, 0.5, 0.75, 1.0])
+    if met == "no target":
+        limits = np.linspace(values.min(), values.max(), 8)
+        limits[0] = 0.0
+    assert (limits[bands] * (1 - 1e-6) < values).all()
+    assert (values <= limits[bands + 1] * (1 + 1e-6)).all()
+    assert {"all": set(bands) == {0}, "none": set(bands) == {6}}.get(met, len(set(bands)) > 2)
     (legend,) = re.findall(r'<ul class="legend bands">(.*?)</ul>', page)
     entries = re.findall(r'<span class="swatch band-(\d)"[^>]*></span>([^<]*)', legend)
     texts = ["0 %", *(f"up to {k} %" for k in (5, 10, 25, 50, 75)), "more than 75 %"]
+    if met == "no target":
+        # Twice the standard uncertainties.
+        told = [f"{2e6 * limit:.3g} µm" for limit in limits[1:-1]]
+        texts = [*(f"up to {one}" for one in told), f"more than {told[-1]}"]
     assert entries == [(str(k), text) for k, text in enumerate(texts)]
 
 
@@ -230,9 +259,10 @@ def test_commands_write_pages(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     bp.simulate(path, seed=1).to_csv(readings, index=False)
     assert main(["fit", path, str(readings), "--report", str(tmp_path / "fit.html")]) == 0
     assert main(["run", path, "--report", str(tmp_path / "design.html")]) == 0
-    results = {"fit": bp.fit(path, readings), "design": path}
+    results = [("fit", bp.fit(path, readings))]
+    results += [("design", one) for one in (path, bp.run(path), bp.check(path))]
     moment = re.compile(r"\d{4}-\d\d-\d\d \d\d:\d\d UTC")
-    for name, result in results.items():
+    for name, result in results:
         page = (tmp_path / f"{name}.html").read_text(encoding="utf-8")
         assert page.startswith("<!DOCTYPE html>") and "two-dimensions.yaml" in page
         own = bp.page(result, tmp_path / "own.html")

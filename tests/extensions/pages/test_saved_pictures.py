@@ -8,8 +8,6 @@ from pathlib import Path
 import pytest
 from ballplate.presentation.svg import drawing, placed_axes, save
 
-from tests.extensions.pages import wording
-
 pytest.importorskip("matplotlib", reason="pictures need matplotlib")
 
 
@@ -35,8 +33,3 @@ def test_a_picture_that_stands_alone_needs_no_fonts(tmp_path: Path) -> None:
     drawn(tmp_path / "one.svg")
     root = ElementTree.parse(tmp_path / "one.svg").getroot()
     assert not root.findall(".//{http://www.w3.org/2000/svg}text")
-
-
-def test_other_endings_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match=wording.SHOULD_END_IN_ONE):
-        drawn(tmp_path / "one.jpg")

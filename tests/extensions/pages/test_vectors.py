@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.cli import main
@@ -56,7 +57,9 @@ def test_fit_draws_them(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> N
     for name, estimator in (("full.svg", "full"), ("reversal.svg", "reversal")):
         assert main(["fit", *REAL, "--estimator", estimator, "--plot", str(tmp_path / name)]) == 0
         drawn = (tmp_path / name).read_text()
-        assert "magnified" in drawn
+        found = bp.fit(bp.load(REAL[0], REAL[-1]), REAL[1], estimator=estimator)
+        found.plot(tmp_path / "method.svg")
+        assert "magnified" in drawn and drawn == (tmp_path / "method.svg").read_text()
         # Ball 13, which the documentation speaks of, can be found.
         assert drawn.count("<!-- 13 -->") == (2 if estimator == "full" else 1)
     assert main(["fit", *REAL, "--plot", str(tmp_path / "none" / "a.svg")]) == 3

@@ -37,23 +37,6 @@ def test_the_shipped_table_is_the_documents() -> None:
     assert {name: ours[name] for name in document} == document
 
 
-def test_the_dome_is_a_quarter_of_a_circle_tangent_to_a_cylinder() -> None:
-    table = {name: np.array(values, dtype=float) for name, values in columns(DOCUMENT).items()}
-    x, z = table["nominal_x_mm"][12:], table["nominal_z_mm"][12:]
-    a, b, c = np.linalg.lstsq(
-        np.column_stack([2 * x, 2 * z, np.ones(20)]), x**2 + z**2, rcond=None
-    )[0]
-    radius = np.sqrt(c + a**2 + b**2)
-    assert (a, b, radius) == pytest.approx((0.0, -37.084, 37.084), abs=1e-4)
-    assert np.abs(np.hypot(x - a, z - b) - radius).max() < 2e-5
-    # Points stand 4.32 degrees apart, the twelfth on the cylinder 1.27 mm (0.05 in) before the
-    # tangent point.
-    np.testing.assert_allclose(np.diff(np.degrees(np.arctan2(x, z + 37.084))), -4.32375, atol=1e-4)
-    assert (table["nominal_x_mm"][11], table["nominal_z_mm"][11]) == pytest.approx(
-        (37.084, -37.084 - 1.27), abs=1e-9
-    )
-
-
 @pytest.mark.parametrize("every", [4, 5])
 def test_the_dome_with_zero_slope_at_the_linear_feature(every: int) -> None:
     fitted = dome(every=every, start_slope="0").fit

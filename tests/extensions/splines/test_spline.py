@@ -116,12 +116,45 @@ def test_coefficients_for_a_controller(
 
 
 def test_drawings(tmp_path: Path) -> None:
+    """All that is drawn is that of the JSON in millimetres and micrometres, within the frame."""
     plot, bars = tmp_path / "fit.svg", tmp_path / "whiskers.svg"
     assert run(PART, "--y", "semi_finish_error", "--plot", plot, "--whiskers", bars) == 0
-    drawn = plot.read_text(encoding="utf-8")
-    assert "<title>semi finish error against arc length: 32 points and a spline from" in drawn
+    curve = bp.spline(PART, y="semi_finish_error", boundary=[TANGENT])
+    found, (axes,) = curve.to_dict(), curve.plot().axes
+    lines = {str(line.get_label()): np.array(line.get_xydata()) for line in axes.lines}
+    x, y = np.array([[point["x"] * 1e3, point["y"] * 1e6] for point in found["points"]]).T
+    knots = np.setdiff1d(found["knots"], found["boundaries"])
+    np.testing.assert_allclose(lines["measured"].T, [x, y])
+    np.testing.assert_allclose(lines["knots"].T, [1e3 * knots, 1e6 * curve.values(knots)])
+    assert lines["boundary of features"][:, 0] / 1e3 == pytest.approx(found["boundaries"] * 2)
+    spline = lines["spline"]
+    low, high = (spline[k(spline[:, 1])] for k in (np.argmin, np.argmax))
+    ends = f"{low[1]:.3g} µm at {low[0]:.3g} mm to {high[1]:.3g} µm at {high[0]:.3g} mm"
+    assert f"32 points and a spline from {ends}" in str(curve.plot().get_label())
     told = "32 points, magnified 200 times; the largest is 94.17 µm"
-    assert told in bars.read_text(encoding="utf-8")
+    assert told in bars.read_text(encoding="utf-8") and plot.exists()
+    (axes,) = curve.plot_whiskers().axes
+    (errors,) = [line.get_xydata() for line in axes.lines if line.get_label() == "error"]
+    start, tips = np.array(errors).reshape(len(x), -1, 2)[:, :2].transpose(1, 0, 2)
+    np.testing.assert_allclose(np.linalg.norm(tips - start, axis=1), 0.2 * np.abs(y), atol=1e-9)
+    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    assert ((tips > [left, bottom]) & (tips < [right, top])).all()
+
+
+def test_the_text_tells_what_the_json_has() -> None:
+    """Polynomials in millimetres and micrometres, rounding as nothing; of many knots the first."""
+    curve = bp.spline(PART, y="semi_finish_error", every=2, powers="global")
+    found, text = curve.to_dict(), str(curve)
+    knots = [f"{1e3 * knot:.6g}" for knot in found["knots"]]
+    assert f"{len(knots)} knots at {', '.join(knots[:12])} mm and {len(knots) - 12} more;" in text
+    lines, pieces = text.splitlines(), found["pieces"]
+    for line, piece in zip(lines[-len(pieces) :], pieces, strict=True):
+        ends, (c0, c1, c2, _) = [piece["start"], piece["end"]], piece["coefficients"]
+        wanted = [*np.multiply(ends, 1e3), 1e6 * c0, 1e3 * c1, c2]
+        assert [float(told) for told in line.split()[:5]] == pytest.approx(wanted, rel=1e-5)
+    assert f"{found['coverage_factor']:.3g} times that for 95 %" in text
+    told = [str(bp.spline(PART, y="semi_finish_error", boundary=one)) for one in ([], [TANGENT])]
+    assert ["makes no boundaries" in one for one in told] == [True, False]
 
 
 @pytest.mark.parametrize(
