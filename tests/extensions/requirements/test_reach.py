@@ -269,7 +269,7 @@ def test_what_the_file_does_not_have(tmp_path: Path) -> None:
     with pytest.raises(NotVariableError, match=wording.UNKNOWN_ARTEFACT_DID_YOU_MEAN):
         reach(experiment, goal, ("size",), artefact="plat")
     found = reach(experiment, goal, ("certificate", "repeats")).answers
-    assert [one.status for one in found] == ["varied", "any"]
+    assert [one.status for one in found] == ["varied", "any"] and found[1].remarks == ()
 
 
 def test_options_that_do_not_fit_are_refused(
