@@ -10,7 +10,6 @@ import pytest
 from ballplate.extensions.sweeps.load import experiment_of, load_sweep
 from ballplate.extensions.sweeps.model import Sweep
 from ballplate.extensions.sweeps.values import subset_count
-from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 
 from tests.extensions.sweeps import wording
@@ -62,21 +61,6 @@ def test_every_combination_is_a_cell(written: Written) -> None:
         np.ptp(experiment.layouts["plate"].coordinates, axis=0), [0.625, 0.625, 0.0], atol=1e-15
     )
     assert len(experiment.layouts["plate"].names) == 16
-
-
-def test_a_cell_is_the_experiment_that_a_variant_would_be(written: Written, tmp_path: Path) -> None:
-    sweep = load_sweep(
-        written("axes:\n  level: {path: 'positions[z low].level', values: [100 mm]}\n")
-    )
-    text = (tmp_path / "quickstart.yaml").read_text(encoding="utf-8")
-    (tmp_path / "v.yaml").write_text(
-        text + 'variants: {one: {"positions[z low].level": 100 mm}}\n', encoding="utf-8"
-    )
-    (expected,) = load(tmp_path / "v.yaml")
-    found = experiment_of(sweep, 0)
-    for one, other in zip(found.positions, expected.positions, strict=True):
-        np.testing.assert_array_equal(one.pose.origin, other.pose.origin)
-        np.testing.assert_array_equal(one.pose.rotation, other.pose.rotation)
 
 
 def test_values_that_change_together(written: Written) -> None:
