@@ -61,12 +61,6 @@ def oblong() -> dict[str, Any]:
     return said
 
 
-def one_tip() -> dict[str, Any]:
-    said = oblong() | {"probes": {"down": ["0 mm", "0 mm", "-50 mm"]}, "calibration": []}
-    said["positions"][1]["probes"] = ["down"]
-    return said
-
-
 @pytest.fixture
 def experiment(request: pytest.FixtureRequest, tmp_path: Path) -> Experiment:
     return loaded(request.param(), tmp_path)
@@ -90,101 +84,89 @@ def rows_of(place: Any) -> Counter[tuple[int, str]]:
     return rows
 
 
-def readings_of(experiment: Experiment, place: Any) -> Array:
-    balls = balls_of(experiment, place)
-    return np.array([balls[k] - experiment.probes[name].offset for k, name in rows_of(place)])
-
-
-@of(oblong, one_tip, flat_metric)
+@of(oblong, flat_metric)
 def test_moves_are_those_of_their_words(experiment: Experiment) -> None:
     """Half a pitch either way, or to the walls: each place once."""
     volume = experiment.machine.volume
     pitch = 1e3 * float(np.diff(experiment.layouts["plate"].coordinates[:2, 0])[0])
     for place in experiment.positions:
         found = [one for one in moves(experiment) if one.subject == f"position {place.name}"]
-        assert len(found) == len({one.words for one in found})
         # To sides, corners and levels; with turns in place or to corners.
-        assert len(found) == {2: 4 + 8 + 15, 3: 6 + 8 + 2 + 15}[experiment.dimension]
+        count = {2: 4 + 8 + 15, 3: 6 + 8 + 2 + 15}[experiment.dimension]
+        assert len(found) == len({one.words for one in found}) == count
         for one in found:
             balls, (u, v) = balls_of(experiment, place), place.pose.rotation.T[:2]
-            turn = re.search(f"by ({'|'.join(QUARTERS)})", one.words)
-            for _ in range(QUARTERS[turn[1]] if turn else 0):
-                middle = 0.5 * (balls.min(axis=0) + balls.max(axis=0))
-                away = balls - middle
-                balls = middle + np.outer(away @ u, v) - np.outer(away @ v, u)
-            rows = readings_of(experiment, one.item)
-            room = np.minimum(rows.min(axis=0) - volume.lower, volume.upper - rows.max(axis=0))
+            for _ in range(next((n for words, n in QUARTERS.items() if words in one.words), 0)):
+                away = balls - 0.5 * (balls.min(axis=0) + balls.max(axis=0))
+                balls = balls - away + np.outer(away @ u, v) - np.outer(away @ v, u)
+            after = balls_of(experiment, one.item)
+            rows = [after[k] - experiment.probes[name].offset for k, name in rows_of(one.item)]
+            room = np.minimum(
+                np.min(rows, axis=0) - volume.lower, volume.upper - np.max(rows, axis=0)
+            )
             for by, sign, axis in re.findall(r"([\d.]+) mm along (-?)([xyz])", one.words):
                 balls[:, "xyz".index(axis)] += float(f"{sign}{by}") / 1e3
                 is_half = float(by) == pytest.approx(pitch / 2)
                 assert is_half or 0 <= room["xyz".index(axis)] + 1e-12 < 1e-4
             for axis, level in re.findall(r"level ([xyz]) = (-?[\d.]+) mm", one.words):
                 balls[:, "xyz".index(axis)] = float(level) / 1e3
-            np.testing.assert_allclose(balls_of(experiment, one.item), balls, atol=1e-8)
+            np.testing.assert_allclose(after, balls, atol=1e-8)
 
 
-@of(oblong, one_tip, bars)
+@of(oblong, bars)
 def test_new_positions_are_those_of_their_words(experiment: Experiment) -> None:
     """Bars along half the directions to the 26 neighbours of a cube; plates at three levels of
-    three planes, turned or not, shifted or not, with probes that suit the plane, or with all.
+    three planes, turned or not, shifted or not, with probes that suit the plane, and with all.
     """
     volume, found = experiment.machine.volume, list(new_positions(experiment))
-    of_plane = {one.item.name: one.item.readings[0].probes for one in reversed(found)}  # type: ignore[union-attr]
-    shared = [tuple(experiment.probes) == probes for probes in of_plane.values()]
-    is_plate = "plate" in experiment.artefacts
-    assert len(found) == (12 * sum(2 - one for one in shared) if is_plate else 13)
-    assert len({one.words for one in found}) == len(found)
+    assert len(found) == len({one.words for one in found})
+    assert len(found) == (13 if "bar" in experiment.artefacts else 3 * 3 * 2 * 2 * 2)
     for one in found:
         place: Any = one.item
         balls = balls_of(experiment, place)
-        if len(experiment.probes) > 1:
-            assert one.words.endswith(f" {' and '.join(place.readings[0].probes)}")
         middle = 0.5 * (balls.min(axis=0) + balls.max(axis=0) - volume.lower - volume.upper)
         if along := re.search(r"along \((.*?)\)", one.words):
             signs, ends = np.array(along[1].split(","), float), balls[1] - balls[0]
             np.testing.assert_allclose(middle, 0.0, atol=1e-5)
             np.testing.assert_allclose(ends / np.linalg.norm(ends), signs / np.linalg.norm(signs))
             continue
+        assert one.words.endswith(f" {' and '.join(place.probes)}")
         told = re.search(r"in plane ([xyz]) at ([\d.]+) mm", one.words)
         shift = re.search(r"shifted by ([\d.]+) mm along both", one.words)
-        assert told and 4e-3 * float(told[2]) in (1.0, 2.0, 3.0)
+        assert told and float(told[2]) in (250, 500, 750) and (not shift or shift[1] == "65")
         np.testing.assert_allclose(balls[:, "xyz".index(told[1])], float(told[2]) / 1e3)
-        axes, by = AXES[told[1]], float(shift[1]) / 1e3 if shift else 0.0
-        np.testing.assert_allclose(middle[axes], by, atol=1e-9)
-        assert by in (0.0, 0.065)
-        is_turned = "turned by 90 deg" in one.words
-        assert place.pose.rotation[axes[is_turned], 0] == pytest.approx(1.0)
-        if experiment.probes.keys() == {"down", "right"}:
-            assert of_plane[place.name] == {"z": ("down",), "x": ("right",)}.get(told[1], ("down",))
+        np.testing.assert_allclose(middle[AXES[told[1]]], 0.065 * bool(shift), atol=1e-9)
+        axis = AXES[told[1]]["turned by 90 deg" in one.words]
+        assert place.pose.rotation[axis, 0] == pytest.approx(1.0)
+        of_plane = ("right",) if told[1] == "x" else ("down",)
+        assert place.probes in (of_plane, ("down", "right"))
 
 
-@of(one_tip, oblong, bars)
+@of(oblong, bars)
 def test_further_readings_are_those_of_their_words(experiment: Experiment) -> None:
     """Of a plate with every other probe, and with tips opposite and across where all are in line."""
     for place in experiment.positions:
-        before, names = rows_of(place), []
+        before = rows_of(place)
         first, *others = (
             one for one in further_readings(experiment) if one.subject.endswith(place.name)
         )
         assert rows_of(first.item) == before + before
-        for one in others:
-            (name,) = map(
-                "".join, re.findall(r"with (?:probe (.*) too|.* too, (.*?), )", one.words)
-            )
+        names = ["minus z" if place.probes == ("right",) else "x", "y", "z", "minus x", "minus y"]
+        assert len(others) == len(names) * ("plate" in experiment.artefacts)
+        for one, name in zip(others, names, strict=False):
+            offset = TIPS[name]
+            if one.probe is None:
+                name = "down" if name == "minus z" else "right"
+            else:
+                words = ", ".join(f"{v:g}" for v in 1e3 * offset + 0.0)
+                assert f"a new probe too, {name}, its offset ({words}) mm" in one.words
+                np.testing.assert_array_equal(one.probe.offset, offset)
+            assert f"probe {name} too" in one.words or one.probe
             more = rows_of(one.item) - before
             assert more == {(ball, name): min(before.values()) for ball, _ in before}
-            names.append(name)
-            if one.probe is not None:
-                told = re.search(r"offset \((.*)\) mm", one.words)
-                assert told and told[1].split(", ") == [f"{1e3 * v:g}" for v in one.probe.offset]
-                np.testing.assert_array_equal(one.probe.offset, TIPS[name])
-        tips = np.array([probe.offset for probe in experiment.probes.values()])
-        new = [name for name in TIPS if np.abs(tips - TIPS[name]).max(axis=1).min() > 0.01]
-        has_plate = "plate" in experiment.artefacts
-        assert names == [*({*experiment.probes} - {*place.probes}), *new] * has_plate
 
 
-@of(oblong, one_tip, flat_metric, bars)
+@of(oblong, flat_metric, bars)
 def test_changes_are_written_as_they_are_and_take_what_they_say(
     experiment: Experiment, request: pytest.FixtureRequest, tmp_path: Path
 ) -> None:
@@ -214,61 +196,45 @@ def test_changes_are_written_as_they_are_and_take_what_they_say(
             for group, same in zip(one.readings, other.readings, strict=True):
                 assert np.array_equal(group.standard_uncertainty, same.standard_uncertainty)
         added: Any = after.calibration[len(experiment.calibration) :]
-        new = sum(np.size(item.values) for item in added)
         # A tip that is to be made counts as one.
-        new += sum(change.probe is not None for change in chosen)
-        assert sum(change.values for change in chosen) == new
+        new = sum(change.probe is not None for change in chosen)
+        assert sum(one.values for one in chosen) == new + sum(np.size(one.values) for one in added)
         for was, item in zip(read.calibration, after.calibration, strict=True):
-            pairs = zip(
-                vars(was.observed(0)).values(), vars(item.observed(0)).values(), strict=True
-            )
-            for found, expected in pairs:
-                np.testing.assert_allclose(found, expected, rtol=1e-12)
+            for key, value in vars(item.observed(0)).items():
+                np.testing.assert_allclose(vars(was.observed(0))[key], value, rtol=1e-12)
 
 
-@of(oblong, one_tip, flat_metric)
+@of(oblong, flat_metric)
 def test_certificates_are_of_what_is_not_calibrated(experiment: Experiment) -> None:
     """Singly the distances of corners and the ten longest; as uncertain as what is calibrated
     already, or else as the best readings.
     """
-    names, balls = experiment.layouts["plate"].names, experiment.layouts["plate"].coordinates
-    columns, last = int(names[-1][-1]), len(names) - 1
+    layout = experiment.layouts["plate"]
     lengths = {
-        pair: float(np.linalg.norm(balls[pair[0]] - balls[pair[1]]))
-        for pair in combinations(range(len(balls)), 2)
+        (i, j): float(np.linalg.norm(layout.coordinates[i] - layout.coordinates[j]))
+        for i, j in combinations(range(len(layout.names)), 2)
     }
-    corners = {*combinations((0, columns - 1, last - columns + 1, last), 2)}
-    sets = {"two diagonals": {pair for pair in corners if sum(pair) == last}}
-    sets["four sides"] = corners - sets["two diagonals"]
-    sets["distances between neighbours"] = {
-        (i, j)
-        for i, j in lengths
-        if j == i + columns or j == i + 1 and i // columns == j // columns
-    }
-    longest = sorted(lengths, key=lambda pair: (-round(lengths[pair], 9), pair))[:10]
-    singles, found, u, text = {*longest, *corners}, set(), np.array([0.2e-6, 0.0]), "0.2 µm"
-    if experiment.calibration:
-        singles -= sets.pop("four sides")
-        u, text = np.array([0.3e-6, 2e-6]), "0.3 µm + L/500000"
+    singles = {*sorted(lengths, key=lambda pair: (-round(lengths[pair], 9), pair))[:10]}
+    singles |= {*combinations(sorted(layout.corner_set), 2)}
+    u, slope, text = 0.2e-6, 0.0, "0.2 µm"
+    for item in experiment.calibration:
+        singles -= {(min(pair), max(pair)) for pair in item.pairs.tolist()}  # type: ignore[attr-defined]
+        u, slope, text = 0.3e-6, 2e-6, "0.3 µm + L/500000"
     for one in certificates(experiment):
-        item: Any = one.item
-        if item.kind == "coordinates":
-            which = "corner " * (len(item.balls) == 4)
-            assert one.words.endswith(f" {len(item.balls)} {which}balls of plate to {text[:6]}")
-            np.testing.assert_allclose(item.standard_uncertainties, u[0])
+        new: Any = one.item
+        if new.kind == "coordinates":
+            assert {*new.standard_uncertainties} == {u}
             continue
-        pairs = {(min(pair), max(pair)) for pair in item.pairs.tolist()}
-        values = np.array([lengths[min(pair), max(pair)] for pair in item.pairs.tolist()])
-        np.testing.assert_allclose(item.values, values)
-        np.testing.assert_allclose(item.standard_uncertainties, u[0] + u[1] * values)
-        told = re.fullmatch(f"calibrate the (.*) of plate( [(]{len(pairs)}[)])? to (.*)", one.words)
-        assert told and told[3] == text
-        if told[2] is None:
-            assert told[1] in {f"distance {names[i]}-{names[j]}" for i, j in [*pairs]}
-            found |= pairs
-        else:
-            assert pairs == sets.pop(told[1], pairs)
-    assert found == singles and not sets
+        values = np.array([lengths[min(pair), max(pair)] for pair in new.pairs.tolist()])
+        np.testing.assert_allclose(new.values, values)
+        np.testing.assert_allclose(new.standard_uncertainties, u + slope * values)
+        told = f"({len(values)}) to {text}"
+        if len(values) == 1:
+            i, j = new.pairs[0]
+            told = f"distance {layout.names[i]}-{layout.names[j]} of plate to {text}"
+            singles.remove((min(i, j), max(i, j)))
+        assert one.words.endswith(told)
+    assert not singles
 
 
 def test_no_position_is_moved_into_a_forbidden_box() -> None:

@@ -16,11 +16,9 @@ from ballplate.results.checked_designs import check
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from tests.extensions.repair import wording
-from tests.reference.yaml_styles import COMMENTS, Writer, plain
+from tests.reference.yaml_styles import Writer, plain
 
 SOURCE = Path("example.yaml")
 
@@ -63,28 +61,6 @@ def text_of(said: dict[str, Any], seed: int = 0, comments: bool = False) -> str:
 @cache
 def repair_of_shifted() -> Repair:
     return first_repair(text_of(shifted()))
-
-
-@settings(max_examples=30, deadline=None)
-@given(seed=st.integers(0, 2**32))
-def test_a_pose_gives_way_to_a_plane_or_its_comment_is_named(seed: int) -> None:
-    said = shifted()
-    for one, origin in zip(said["positions"], ([250, 250], [350, 300], [150, 400]), strict=True):
-        del one["corner"]
-        one["pose"] = {"origin": [f"{value} mm" for value in origin], "rotation": "0 deg"}
-    text = text_of(said, seed, comments=True)
-    try:
-        new = mended(text, SOURCE, None, repair_of_shifted())
-    except ExperimentError as error:
-        (message,) = error.messages
-        line = text.split("\n")[message.line - 1]
-        assert line[message.column - 1] == "#" and message.path.startswith("positions[")
-        return
-    for comment in {one.strip() for one in COMMENTS} - {""}:
-        assert new.count(comment) == text.count(comment)
-    assert check(experiment(new)).verdict.deficiency == 0
-    after = plain(new)
-    assert sum("pose" in one for one in after["positions"]) == 2
 
 
 def test_a_number_as_name_means_the_position_of_that_name() -> None:

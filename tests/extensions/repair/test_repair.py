@@ -431,18 +431,16 @@ def pool_of(
     )
 
 
-def test_the_cheapest_of_a_pool_within_its_limits() -> None:
+def test_the_cheapest_of_a_pool() -> None:
     """What costs nothing comes before what the pool has a price for, and without a target that
     before what takes longer.
     """
     experiment = replace(design("npl/6.1.1", "B"), target_uncertainty=None)
-    for limits, is_offered in (((), True), ((AtMost((4, 6), 0),), False)):
-        pool = pool_of(experiment, [60.0, 5400.0, 600.0], limits)
-        moved, read = repairs(replace(experiment, pool=pool)).repairs
-        assert [one.kind for one in moved.changes] == [ChangeKind.MOVE]
-        (change,) = read.changes
-        assert (change.words == wording.ADD_OF_THE_POOL) == is_offered
-        assert read.seconds == (600.0 if is_offered else 855.0)
+    pool = pool_of(experiment, [60.0, 5400.0, 600.0])
+    moved, read = repairs(replace(experiment, pool=pool)).repairs
+    assert [one.kind for one in moved.changes] == [ChangeKind.MOVE]
+    (change,) = read.changes
+    assert change.words == wording.ADD_OF_THE_POOL and read.seconds == 600.0
 
 
 def test_a_pool_of_a_file(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from decimal import Decimal
+from itertools import product
 from pathlib import Path
 
 import pytest
@@ -159,15 +160,10 @@ def test_balls_are_the_fewest_of_all_grids_nearly_in_proportion(
     """
     text = TEXT.replace("[4, 4]", f"[{drawn[0]}, {drawn[1]}]")
     ratio = drawn[0] / drawn[1]
-    sides = range(2, 9)
-    near = [
-        (n, m)
-        for n in sides
-        for m in sides
-        if abs(n - m * ratio) <= 1.0 or abs(m - n / ratio) <= 1.0
-    ]
     values = {
-        grid: average(tmp_path, (str(list(drawn)), str(list(grid))), text=text) for grid in near
+        (n, m): average(tmp_path, (str(list(drawn)), f"[{n}, {m}]"), text=text)
+        for n, m in product(range(2, 9), repeat=2)
+        if abs(n - m * ratio) <= 1.0 or abs(m - n / ratio) <= 1.0
     }
     wanted = {(4, 4): (6, 5), (4, 3): (7, 6), (3, 5): (4, 5)}[drawn]
     limit = 1.0001 * values[wanted]

@@ -7,38 +7,52 @@ from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 
+import ballplate as bp
 import pytest
+import yaml
 from ballplate.extensions.sweeps import estimate
 from ballplate.extensions.sweeps.execute import run_sweep
 from ballplate.extensions.sweeps.load import load_sweep
+from ballplate.extensions.sweeps.model import Choice
 from ballplate.extensions.sweeps.task import CellResult
-from ballplate.extensions.sweeps.values import subset_count, subsets
 from ballplate.simulator.computing import ProgressStep
 
 from tests.extensions.sweeps.stores import axis, made_up
 from tests.extensions.sweeps.support import small_sweep
 
 
-@pytest.mark.parametrize("always, among", [("", "abcdef"), ("c", "abcdef"), ("bf", "ade")])
-@pytest.mark.parametrize("sizes", [(1, 3), (2,), (4, 5, 6)])
-def test_subsets_are_all_of_a_size(always: str, among: str, sizes: tuple[int, ...]) -> None:
-    found = subsets([*"abcdef"], (*always,), (*among,), sizes)
-    allowed = {*always, *among}
+@pytest.mark.parametrize(
+    "always, among", [((), (0, 1, 2, 3, 4, 5)), ((2,), (0, 1, 5)), ((1, 3), ())]
+)
+def test_subsets_are_all_of_a_size(
+    always: tuple[int, ...], among: tuple[int, ...], tmp_path: Path
+) -> None:
+    names = [one.name for one in bp.quickstart().positions]
+    fewest, most = max(len(always), 1), len({*always, *among})
+
+    def subsets(*sizes: int) -> list[Choice]:
+        chosen = {"always": [names[k] for k in always], "among": [names[k] for k in among]}
+        axes = {"kept": {"path": "positions", "subsets": {"sizes": [*sizes], **chosen}}}
+        path = tmp_path / "s.yaml"
+        said = {"title": "t", "base": str(Path("designs/quickstart.yaml").resolve()), "axes": axes}
+        path.write_text(yaml.safe_dump(said), encoding="utf-8")
+        return load_sweep(path).axes[0].choices
+
     expected = [
         some
-        for size in sizes
-        for some in combinations("abcdef", size)
-        if {*always} <= {*some} <= allowed
+        for size in range(fewest, most + 1)
+        for some in combinations(range(6), size)
+        if {*always} <= {*some} <= {*always, *among}
     ]
-    assert [names for _, names in found] == expected
-    if len(allowed) == 6:
-        assert subset_count(6, len(always), sizes) == len(expected)
-    for label, names in found:
-        others = [name for name in "abcdef" if name not in names]
-        without = label.removeprefix("all").removeprefix(" but ")
-        is_short = 2 * len(others) < len(names)
-        assert label.startswith("all") is is_short
-        assert without == (" and ".join(others) if is_short else " + ".join(names))
+    found = subsets(*range(fewest, most + 1))
+    for choice, some in zip(found, expected, strict=True):
+        kept, others = [names[k] for k in some], [names[k] for k in range(6) if k not in some]
+        assert choice.kept is not None and list(choice.kept[1]) == kept
+        words = f"all but {' and '.join(others)}" if others else "all"
+        assert choice.label == (words if 2 * len(others) < len(kept) else " + ".join(kept))
+    for size in {max(fewest - 1, 1), most + 1} - {fewest}:
+        with pytest.raises(bp.ExperimentError, match=f" {size} entries; give {fewest} to {most}"):
+            subsets(size)
 
 
 @pytest.mark.parametrize("fail_fast", [False, True])

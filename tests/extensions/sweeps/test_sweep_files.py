@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from ballplate.extensions.sweeps.load import experiment_of, load_sweep
 from ballplate.extensions.sweeps.model import Sweep
-from ballplate.extensions.sweeps.values import subset_count
 from ballplate.simulator.inputs.messages import ExperimentError
 
 from tests.extensions.sweeps import wording
@@ -95,19 +94,6 @@ def test_named_values_and_conditions(written: Written) -> None:
         *(f"size small, balls {balls}" for balls in (4, 5, 7)),
         "size large, balls 7",
     ]
-
-
-def test_subsets_of_positions(written: Written) -> None:
-    sweep = load_sweep(
-        written(
-            "axes:\n  strategy:\n    path: positions\n    subsets: {sizes: [3, 6], always: [x low],"
-            " among: [z low, z high, y low, y high, x high]}\n"
-        )
-    )
-    assert len(sweep.cells) == 10 + 1 == subset_count(6, 1, (3, 6))
-    assert [sweep.axes[0].choices[k].label for k in (0, 10)] == ["z low + z high + x low", "all"]
-    assert [one.name for one in experiment_of(sweep, 0).positions] == ["z low", "z high", "x low"]
-    assert len(experiment_of(sweep, 10).positions) == 6
 
 
 def test_variants_are_an_axis(written: Written, tmp_path: Path) -> None:
