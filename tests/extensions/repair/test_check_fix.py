@@ -87,10 +87,7 @@ def test_deficient_variants_are_mended_and_the_others_left(
 
 
 def test_line_ends_and_marks_stay(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for name, text in {
-        "crlf": SHIFTED.replace("\n", "\r\n"),
-        "mark": "\ufeff" + SHIFTED,
-    }.items():
+    for name, text in {"crlf": SHIFTED.replace("\n", "\r\n"), "mark": "\ufeff" + SHIFTED}.items():
         path = folder / f"{name}.yaml"
         path.write_bytes(text.encode())
         new = bp.repair(path)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from ballplate.extensions.repair.candidates import candidates
+from ballplate.extensions.repair.candidates import candidates, further_readings
 from ballplate.extensions.repair.changes import Change, ChangeKind, changed
 from ballplate.extensions.repair.mending import mended
 from ballplate.extensions.repair.repair_search import loosened, repairs
@@ -36,6 +36,7 @@ from ballplate.simulator.experiment.model import (
     Pool,
     Position,
 )
+from ballplate.simulator.experiment.pools import seconds_of
 
 from tests.extensions.repair import wording
 from tests.reference import dense
@@ -118,6 +119,9 @@ def hold(said: dict[str, Any], experiment: Experiment, found: Repairs, folder: P
             assert f"average U6 {number(1e6 * planned.lengths.average)} µm" in repair.outcome
         more = sum(one.count for one in after.positions)
         assert repair.readings == more - sum(one.count for one in experiment.positions)
+        if experiment.pool is None:
+            was, now = (sum(map(seconds_of, one.positions)) for one in (experiment, after))
+            assert repair.seconds == pytest.approx(now - was)
         assert len({one.name for one in after.positions}) == len(after.positions)
 
 
@@ -389,6 +393,13 @@ def test_weak_directions(tmp_path: Path) -> None:
     found = repairs(experiment)
     assert found.repairs and not found.repairs[0].weak
     hold(plain(Path("designs/certified/weak.yaml"), None), experiment, found, tmp_path)
+
+
+def test_positions_read_twice_as_often() -> None:
+    (experiment,) = load(Path("designs/quickstart.yaml"))
+    twice = [one.item for one in further_readings(experiment) if "twice as often" in one.words]
+    assert [place.name for place in twice] == [place.name for place in experiment.positions]
+    assert {group.repeats for place in twice for group in place.readings} == {2}
 
 
 def test_what_a_plan_cannot_weigh_is_said(tmp_path: Path) -> None:

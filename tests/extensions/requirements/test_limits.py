@@ -13,18 +13,8 @@ import numpy as np
 import pytest
 from ballplate.extensions.requirements.answers import Answer
 from ballplate.extensions.requirements.goals import Judgement, judge, parse_goal
-from ballplate.extensions.requirements.root_search import (
-    Tried,
-    _scanned,
-    _Searched,
-    _Trials,
-    reach,
-)
-from ballplate.extensions.requirements.unknowns import (
-    NotVariableError,
-    UnknownName,
-    unknown,
-)
+from ballplate.extensions.requirements.root_search import Tried, _scanned, _Searched, _Trials, reach
+from ballplate.extensions.requirements.unknowns import NotVariableError, unknown
 from ballplate.results.checked_designs import predict
 from ballplate.simulator.experiment.loading import load
 
@@ -187,38 +177,6 @@ def test_a_certificate_is_varied_with_what_its_values_have_in_common() -> None:
     half = {**item, "standard_uncertainty": own, "common": common}
     found = bp.run(stated.with_({"calibration": [half]})).quantities["U6"].average
     assert 0.995 < found / (0.4 * present + 0.6 * least) <= 1.0
-
-
-# What is read in a file of each unknown, and its smallest and largest value in that of the design.
-READ: dict[UnknownName, Any] = {
-    "repeatability": (lambda one: one.machine.repeatability[0], 1e-4, 1e4),
-    "certificate": (lambda one: one.calibration[0].standard_uncertainties[0], 1e-4, 1e4),
-    "tips": (lambda one: one.probes["right"].standard_uncertainty[0], 1e-4, 1e4),
-    "thermometers": (
-        lambda one: one.influences[0].scale_temperature.standard_uncertainty,
-        1e-4,
-        1e4,
-    ),
-    "repeats": (lambda one: one.positions[0].readings[0].repeats, 1, 10_000),
-    "balls": (lambda one: one.artefacts["plate"].balls[0], 2 / 3, 10),
-    "size": (lambda one: np.ptp(one.layouts["plate"].coordinates[:, 0]), 0.05, 100),
-}
-
-
-@pytest.mark.parametrize("name", READ)
-def test_values_are_those_that_words_and_files_say(name: UnknownName) -> None:
-    tip = {"offset": ["50 mm", "0 mm", "0 mm"], "standard_uncertainty": "0.3 um"}
-    experiment = warm().with_({"probes.right": tip})
-    sought = unknown(name, experiment, experiment.tree, None, None)
-    read, *ends = READ[name]
-    for step, ratio in ((sought.first, ends[0]), (sought.drawn, 1.0), (sought.last, ends[1])):
-        assert sought.value(step) == pytest.approx(ratio * read(experiment), rel=1e-9)
-    for step in {sought.first, max(sought.drawn - 7, sought.first), sought.drawn + 1}:
-        value = read(experiment.builder(sought.tree(step)))
-        number, unit = f"{sought.words(step)} 1".split()[:2]
-        scale = {"um": 1e-6, "mm": 1e-3, "nm": 1e-9}.get(unit, 1.0)
-        assert value == pytest.approx(sought.value(step), rel=1e-9)
-        assert value == pytest.approx(scale * float(number), rel=1e-9)
 
 
 @pytest.mark.parametrize("columns, rows", [(6, 4), (3, 5), (2, 40)])

@@ -149,8 +149,7 @@ def test_the_size_is_the_smallest_that_does(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "drawn",
-    [(4, 3), *(pytest.param(one, marks=pytest.mark.long) for one in ((4, 4), (3, 5)))],
+    "drawn", [(4, 3), *(pytest.param(one, marks=pytest.mark.long) for one in ((4, 4), (3, 5)))]
 )
 def test_balls_are_the_fewest_of_all_grids_nearly_in_proportion(
     tmp_path: Path, drawn: tuple[int, int]
@@ -272,11 +271,7 @@ def test_options_that_do_not_fit_are_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = str(written(tmp_path, TEXT))
-    for wrong in (
-        ["--goal", "U9"],
-        ["--share", "95%", "--goal", "tasks"],
-        ["--calibration", "1"],
-    ):
+    for wrong in (["--goal", "U9"], ["--share", "95%", "--goal", "tasks"], ["--calibration", "1"]):
         assert main(["reach", file, "--by", "certificate", *wrong]) == 2
         assert capsys.readouterr().err.startswith("ballplate reach: ")
 

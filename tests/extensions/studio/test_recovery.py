@@ -153,8 +153,7 @@ def test_changes_that_are_left_on_purpose_are_gone(design):
 
 
 @pytest.mark.parametrize(
-    "content",
-    ["{", '{"text": 1}', '{"text": "x", "content": "?"}', "[" * 100_000, "\xff"],
+    "content", ["{", '{"text": 1}', '{"text": "x", "content": "?"}', "[" * 100_000, "\xff"]
 )
 def test_what_cannot_be_read_is_told_and_never_written_over(design, content):
     kept_in(design).write_text(content, encoding="latin-1")

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from contextlib import closing
-from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
 
 import ballplate as bp
 import pytest
 import yaml
-from ballplate.extensions.sweeps import estimate
 from ballplate.extensions.sweeps.execute import run_sweep
 from ballplate.extensions.sweeps.load import load_sweep
 from ballplate.extensions.sweeps.model import Choice
@@ -87,21 +85,3 @@ def test_a_run_reports_each_row(
     assert (summary.done, summary.failed, len(steps)) == (
         (3, 1, 1 + 7 + 7 + 1 + 14 + 2) if not fail_fast else (0, 1, 1 + 7 + 4)
     )
-
-
-def test_the_time_to_come_is_that_of_the_cells_and_data_sets(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Cells take 1 s, 2 s, ... and each data set 10 ms; the last of six fails without."""
-
-    def computed(sweep, task) -> CellResult:
-        status = "failed" if task.number == 5 else "done"
-        seconds = 1.0 + task.number + 0.01 * (sweep.trials or 0)
-        return CellResult(task.number, 0, "key", status, seconds=seconds)
-
-    monkeypatch.setattr(estimate, "compute", computed)
-    sweep = load_sweep(small_sweep(tmp_path, 3))
-    for trials in (None, 100, 5000):
-        seconds, rows = estimate.seconds_of(replace(sweep, trials=trials))
-        assert [row.number for row in rows] == [0, 2, 5]
-        assert seconds == pytest.approx(6 * (1 + 3 + 6 + 2 * 0.01 * (trials or 0)) / 3)

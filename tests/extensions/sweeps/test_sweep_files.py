@@ -90,10 +90,7 @@ def test_named_values_and_conditions(written: Written) -> None:
     ]
     assert labels(
         load_sweep(written(text + "only: [{size: small}, {balls: {above: 5}, size: 0.75 m}]\n"))
-    ) == [
-        *(f"size small, balls {balls}" for balls in (4, 5, 7)),
-        "size large, balls 7",
-    ]
+    ) == [*(f"size small, balls {balls}" for balls in (4, 5, 7)), "size large, balls 7"]
 
 
 def test_variants_are_an_axis(written: Written, tmp_path: Path) -> None:

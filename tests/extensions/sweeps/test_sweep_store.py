@@ -26,14 +26,7 @@ from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 
 from tests.extensions.sweeps import wording
-from tests.extensions.sweeps.support import (
-    ROOT,
-    assert_same,
-    command,
-    rows,
-    run,
-    small_sweep,
-)
+from tests.extensions.sweeps.support import ROOT, assert_same, command, rows, run, small_sweep
 
 
 def sweep(path: Path, *options: str) -> int:
