@@ -87,11 +87,10 @@ def test_without_certificate_uncertainties_are_proportional_to_the_repeatability
     assert found.words == f"{1e6 * found.value:.9g} um"
 
 
-@pytest.mark.parametrize("limit", [0.05e-6])
 def test_without_certificate_uncertainties_fall_with_the_root_of_the_repeats(
-    tmp_path: Path, limit: float
+    tmp_path: Path,
 ) -> None:
-    now = average(tmp_path, text=UNCALIBRATED)
+    now, limit = average(tmp_path, text=UNCALIBRATED), 0.05e-6
     found = answer(tmp_path, Goal("quantity", limit=limit), "repeats", UNCALIBRATED)
     assert found.value == math.ceil((now / limit) ** 2)
     assert found.beside.startswith(f"{found.value - 1:g} is not enough: average U6 ")

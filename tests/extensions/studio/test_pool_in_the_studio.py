@@ -57,10 +57,11 @@ def test_a_pool_that_fills_the_volume_is_a_group_for_each_plane(document):
 @pytest.mark.parametrize("edge", [0.0, 20.0])
 def test_groups_reach_from_end_to_end(document, edge: float) -> None:
     """Balls and readings, in whole tenths of a millimetre, `edge` from the walls beside them."""
-    sides = [512.34, 300.06]
-    size = {"do": "set", "path": ["artefacts", "plate", "size"]}
-    pool = f"pool: {{limits: {{edge: {edge} mm}}}}\n" if edge else ""
-    text = done(document, size | {"value": f"[{sides[0]} mm, {sides[1]} mm]"}).text + pool
+    sides, text = (
+        [512.34, 300.06],
+        document.text.replace("[750 mm, 750 mm]", "[512.34 mm, 300.06 mm]"),
+    )
+    text += f"pool: {{limits: {{edge: {edge} mm}}}}\n" if edge else ""
     said = yaml.safe_load(done(done(document, {"do": "text", "text": text}), FILL).text)
     groups = said["pool"]["candidates"]
     assert len(groups) == 6

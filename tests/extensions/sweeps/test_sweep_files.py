@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 import pytest
 from ballplate.extensions.sweeps.load import experiment_of, load_sweep
 from ballplate.extensions.sweeps.model import Sweep
+from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 
 from tests.extensions.sweeps import wording
@@ -91,6 +93,32 @@ def test_named_values_and_conditions(written: Written) -> None:
     assert labels(
         load_sweep(written(text + "only: [{size: small}, {balls: {above: 5}, size: 0.75 m}]\n"))
     ) == [*(f"size small, balls {balls}" for balls in (4, 5, 7)), "size large, balls 7"]
+
+
+@pytest.mark.parametrize("always, among", [("", "abcdef"), ("c", "abf"), ("bd", "")])
+def test_subsets_are_all_of_a_size(always: str, among: str, written: Written) -> None:
+    (base,) = load(Path("designs/quickstart.yaml"))
+    names = dict(zip("abcdef", (one.name for one in base.positions), strict=True))
+    fewest, most = max(len(always), 1), len({*always, *among})
+
+    def subsets(*sizes: int) -> Path:
+        chosen = f"always: {[names[k] for k in always]}, among: {[names[k] for k in among]}"
+        subsets = f"{{sizes: {[*sizes]}, {chosen}}}"
+        return written(f"axes: {{kept: {{path: positions, subsets: {subsets}}}}}\n")
+
+    sizes = range(fewest, most + 1)
+    sweep = load_sweep(subsets(*sizes))
+    every = (some for size in sizes for some in combinations("abcdef", size))
+    expected = [some for some in every if {*always} <= {*some} <= {*always, *among}]
+    for cell, some in enumerate(expected):
+        kept, others = [names[k] for k in some], [names[k] for k in "abcdef" if k not in some]
+        words = f"all but {' and '.join(others)}" if others else "all"
+        words = words if 2 * len(others) < len(kept) else " + ".join(kept)
+        assert sweep.axes[0].choices[cell].label == words
+    assert [one.name for one in experiment_of(sweep, len(expected) - 1).positions] == kept
+    assert len(sweep.cells) == len(expected)
+    for size in {max(fewest - 1, 1), most + 1} - {fewest}:
+        assert f" {size} entries; give {fewest} to {most}" in refusal(subsets(size))[0]
 
 
 def test_variants_are_an_axis(written: Written, tmp_path: Path) -> None:
