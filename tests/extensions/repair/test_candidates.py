@@ -91,6 +91,9 @@ def test_new_positions_are_those_of_their_words(experiment: Experiment) -> None:
             signs, ends = np.array(along[1].split(","), float), balls[1] - balls[0]
             np.testing.assert_allclose(middle, 0.0, atol=1e-5)
             np.testing.assert_allclose(ends / np.linalg.norm(ends), signs / np.linalg.norm(signs))
+            rotation = place.pose.rotation
+            np.testing.assert_allclose(np.cross(*rotation.T[[1, 2]]), rotation[:, 0], atol=1e-12)
+            np.testing.assert_allclose(np.linalg.norm(rotation, axis=0), 1.0, rtol=1e-12)
             continue
         assert one.words.endswith(f" {' and '.join(place.probes)}")
         told = re.search(r"in plane ([xyz]) at ([\d.]+) mm", one.words)
