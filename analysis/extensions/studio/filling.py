@@ -76,7 +76,7 @@ def filled(
     size = np.ptp(experiment.layouts[artefact].coordinates[:, :2], axis=0)
     by_size: dict[tuple[float, ...], list[int]] = {}
     for turn in turns:
-        turned = np.round(size[::-1] if turn % 2 else size, 4)
+        turned = np.round(size[::-1] if turn % 2 else size, 9)
         by_size.setdefault(tuple(turned), []).append(turn)
     for plane, names in probes.items():
         # Both balls and scale readings stay within the volume.

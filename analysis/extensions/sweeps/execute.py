@@ -9,6 +9,7 @@ from operator import add
 
 from ballplate.montecarlo import Accumulator
 from ballplate.simulator.computing import ProgressStep, Report, unreported
+from ballplate.simulator.inputs import number_of
 
 from .model import Sweep
 from .store import Store, add_keys, add_rows, block_tally, keys, statuses
@@ -42,7 +43,7 @@ class Summary:
     @property
     def step(self) -> ProgressStep:
         """The same as a step for a progress display."""
-        notes = [f"{self.blocks} blocks of data sets"] if self.blocks else []
+        notes = [f"{number_of(self.blocks, 'block')} of data sets"] if self.blocks else []
         notes += [f"{self.failed} failed"] if self.failed else []
         return ProgressStep(
             "cases", self.done + self.failed, self.cells, ", ".join(notes), self.before

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -17,11 +16,9 @@ from ballplate.results.checked_designs import check
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from tests.extensions.repair import wording
-from tests.reference.yaml_styles import COMMENTS, Writer, lines_ended, plain
+from tests.reference.yaml_styles import Writer, plain
 
 SOURCE = Path("example.yaml")
 
@@ -64,57 +61,6 @@ def text_of(said: dict[str, Any], seed: int = 0, comments: bool = False) -> str:
 @cache
 def repair_of_shifted() -> Repair:
     return first_repair(text_of(shifted()))
-
-
-@settings(max_examples=40, deadline=None)
-@given(
-    seed=st.integers(0, 2**32),
-    line_end=st.sampled_from(["\n", "\r\n"]),
-    has_last=st.booleans(),
-    is_expected=st.booleans(),
-)
-def test_files_of_any_style(seed: int, line_end: str, has_last: bool, is_expected: bool) -> None:
-    said = shifted(**({"expected_rank_deficiency": 2} if is_expected else {}))
-    text = lines_ended(text_of(said, seed, comments=True), line_end, has_last)
-    repair = repair_of_shifted()
-    (edit,) = repair.edits
-    new = mended(text, SOURCE, None, repair)
-    expected = copy.deepcopy(said)
-    place = next(one for one in expected["positions"] if one["name"] == edit.steps[1])
-    place["quarter_turns"] = edit.value["quarter_turns"]
-    if is_expected:
-        expected["expected_rank_deficiency"] = 0
-        text = text.replace("deficiency: 2", "deficiency: 0").replace(
-            'deficiency": 2', 'deficiency": 0'
-        )
-    assert plain(new) == expected
-    rest = iter(new)
-    assert all(one in rest for one in text)
-    assert new.count("\r") == (new.count("\n") if line_end == "\r\n" else 0)
-    assert new.endswith(line_end) == has_last
-    assert check(experiment(new)).verdict.deficiency == 0
-
-
-@settings(max_examples=30, deadline=None)
-@given(seed=st.integers(0, 2**32))
-def test_a_pose_gives_way_to_a_plane_or_its_comment_is_named(seed: int) -> None:
-    said = shifted()
-    for one, origin in zip(said["positions"], ([250, 250], [350, 300], [150, 400]), strict=True):
-        del one["corner"]
-        one["pose"] = {"origin": [f"{value} mm" for value in origin], "rotation": "0 deg"}
-    text = text_of(said, seed, comments=True)
-    try:
-        new = mended(text, SOURCE, None, repair_of_shifted())
-    except ExperimentError as error:
-        (message,) = error.messages
-        line = text.split("\n")[message.line - 1]
-        assert line[message.column - 1] == "#" and message.path.startswith("positions[")
-        return
-    for comment in {one.strip() for one in COMMENTS} - {""}:
-        assert new.count(comment) == text.count(comment)
-    assert check(experiment(new)).verdict.deficiency == 0
-    after = plain(new)
-    assert sum("pose" in one for one in after["positions"]) == 2
 
 
 def test_a_number_as_name_means_the_position_of_that_name() -> None:

@@ -16,12 +16,13 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from ballplate.extensions.repair.candidates import along_rotation, candidates, further_readings
-from ballplate.extensions.repair.changes import Change, ChangeKind, changed, scale_readings
+from ballplate.extensions.repair.candidates import candidates, further_readings
+from ballplate.extensions.repair.changes import Change, ChangeKind, changed
 from ballplate.extensions.repair.mending import mended
 from ballplate.extensions.repair.repair_search import loosened, repairs
-from ballplate.extensions.repair.repairs import Repair, Repairs
+from ballplate.extensions.repair.repairs import Repairs
 from ballplate.extensions.repair.search import Losses, best_set, change_pool, mean_target
+from ballplate.extensions.repair.written import Edit
 from ballplate.planning.checked_files import Wanted, check_files
 from ballplate.presentation.formatting import number
 from ballplate.results.checked_designs import check, predict
@@ -94,9 +95,9 @@ def place(entries: list[Any], step: str) -> int:
     )
 
 
-def written_out(said: dict[str, Any], repair: Repair, folder: Path) -> Experiment:
-    """The experiment of the file with a repair's edits in it."""
-    for edit in repair.edits:
+def written_out(said: dict[str, Any], edits: Iterable[Edit], folder: Path) -> Experiment:
+    """The experiment of the file with edits in it."""
+    for edit in edits:
         put(said, edit.path, edit.value, edit.is_new)
     path = folder / "repaired.yaml"
     path.write_text(yaml.safe_dump(said), encoding="utf-8")
@@ -104,15 +105,10 @@ def written_out(said: dict[str, Any], repair: Repair, folder: Path) -> Experimen
     return found
 
 
-def minutes(experiment: Experiment) -> float:
-    return sum(map(seconds_of, experiment.positions)) / 60.0
-
-
 def hold(said: dict[str, Any], experiment: Experiment, found: Repairs, folder: Path) -> None:
     """What each repair prints is what the file with its edits has."""
-    names = {one.name for one in experiment.positions}
     for repair in found.repairs:
-        after = written_out(dict(yaml.safe_load(yaml.safe_dump(said))), repair, folder)
+        after = written_out(dict(yaml.safe_load(yaml.safe_dump(said))), repair.edits, folder)
         planned, verdict = predict(after), check(after).verdict
         assert (verdict.deficiency, len(verdict.weak)) == (repair.deficiency, repair.weak)
         assert f"smallest singular value {repair.smallest:.3g}" in repair.outcome
@@ -124,13 +120,9 @@ def hold(said: dict[str, Any], experiment: Experiment, found: Repairs, folder: P
         more = sum(one.count for one in after.positions)
         assert repair.readings == more - sum(one.count for one in experiment.positions)
         if experiment.pool is None:
-            np.testing.assert_allclose(repair.seconds / 60.0, minutes(after) - minutes(experiment))
+            was, now = (sum(map(seconds_of, one.positions)) for one in (experiment, after))
+            assert repair.seconds == pytest.approx(now - was)
         assert len({one.name for one in after.positions}) == len(after.positions)
-        assert names <= {one.name for one in after.positions}
-        lower, upper = after.machine.volume.of_readings
-        for one in after.positions:
-            rows = scale_readings(one, after.layouts[one.artefact], after.probes)
-            assert ((rows >= lower) & (rows <= upper)).all()
 
 
 @pytest.mark.parametrize("file, variant", DEFICIENT)
@@ -215,7 +207,7 @@ def nothing_known() -> dict[str, Any]:
 def flat_metric() -> dict[str, Any]:
     return {
         "title": "one position",
-        "machine": {"volume": ["900 mm", "900 mm"], "repeatability": "0.2 um"},
+        "machine": {"volume": ["900 mm", "900 mm"], "repeatability": ["0.3 um", "0.2 um"]},
         "error_model": {"kind": "metric", "scale": "x"},
         "artefacts": {"plate": {"kind": "grid", "balls": [4, 4], "size": ["360 mm", "360 mm"]}},
         "positions": [{"name": "only", "corner": {"x": "100 mm", "y": "200 mm"}}],
@@ -252,7 +244,7 @@ def test_traps(trap: str, tmp_path: Path) -> None:
     hold(TRAPS[trap](), experiment, found, tmp_path)
     for k, repair in enumerate(found.repairs, 1):
         (line,) = (one for one in found.lines() if one.startswith(f"repair {k}: "))
-        after = written_out(TRAPS[trap](), repair, tmp_path)
+        after = written_out(TRAPS[trap](), repair.edits, tmp_path)
         scale = check(after).scale
         assert scale is not None
         assert scale.rests_on_offsets == (wording.SCALE_RESTS_ON_PROBE_OFFSETS in line)
@@ -417,16 +409,6 @@ def test_what_a_plan_cannot_weigh_is_said(tmp_path: Path) -> None:
     assert wording.A_PLAN_CANNOT_WEIGH in line
 
 
-@pytest.mark.parametrize("d", [2, 3])
-def test_bars_are_laid_along_a_direction(d: int) -> None:
-    generator = np.random.default_rng(d)
-    for u in (*generator.normal(size=(5, d)), np.eye(d)[-1]):
-        rotation = along_rotation(u / np.linalg.norm(u))
-        np.testing.assert_allclose(rotation[:, 0], u / np.linalg.norm(u), atol=1e-12)
-        np.testing.assert_allclose(rotation @ rotation.T, np.eye(d), atol=1e-12)
-        assert np.linalg.det(rotation) == pytest.approx(1.0)
-
-
 def pool_of(
     experiment: Experiment,
     seconds: list[float],
@@ -460,32 +442,16 @@ def pool_of(
     )
 
 
-def test_the_cheapest_of_a_pool_within_its_limits() -> None:
+def test_the_cheapest_of_a_pool() -> None:
     """What costs nothing comes before what the pool has a price for, and without a target that
     before what takes longer.
     """
     experiment = replace(design("npl/6.1.1", "B"), target_uncertainty=None)
-    for limits, is_offered in (((), True), ((AtMost((4, 6), 0),), False)):
-        pool = pool_of(experiment, [60.0, 5400.0, 600.0], limits)
-        moved, read = repairs(replace(experiment, pool=pool)).repairs
-        assert [one.kind for one in moved.changes] == [ChangeKind.MOVE]
-        (change,) = read.changes
-        assert (change.words == wording.ADD_OF_THE_POOL) == is_offered
-        assert read.seconds == (600.0 if is_offered else 855.0)
-
-
-def test_no_position_is_moved_into_a_forbidden_box() -> None:
-    experiment = design("npl/6.1.1", "B")
-    free = candidates(replace(experiment, pool=pool_of(experiment, [1.0] * 3)))
-    box = np.array([[[0.0, 0.0, 0.15], [1.0, 1.0, 1.0]]])
-    pool = pool_of(experiment, [1.0] * 3, (), box)
-    bounded = candidates(replace(experiment, pool=pool))
-    moves = [one.item for one in bounded if one.kind is ChangeKind.MOVE]
-    assert moves and len(moves) < sum(one.kind is ChangeKind.MOVE for one in free)
-    for one in moves:
-        assert isinstance(one, Position)
-        balls = experiment.layouts["plate"].coordinates @ one.pose.rotation.T + one.pose.origin
-        assert balls[:, 2].max() <= 0.15 + 1e-9
+    pool = pool_of(experiment, [60.0, 5400.0, 600.0])
+    moved, read = repairs(replace(experiment, pool=pool)).repairs
+    assert [one.kind for one in moved.changes] == [ChangeKind.MOVE]
+    (change,) = read.changes
+    assert change.words == wording.ADD_OF_THE_POOL and read.seconds == 600.0
 
 
 def test_a_pool_of_a_file(tmp_path: Path) -> None:
@@ -498,5 +464,5 @@ def test_a_pool_of_a_file(tmp_path: Path) -> None:
     assert isinstance(one.suggestions, Repairs) and one.prediction.verdict.deficiency
     first = one.suggestions.repairs[0]
     assert any(change.candidate >= 0 for change in first.changes)
-    after = check(written_out(said, first, tmp_path)).verdict
+    after = check(written_out(said, first.edits, tmp_path)).verdict
     assert not after.deficiency and not after.weak

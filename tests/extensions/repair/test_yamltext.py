@@ -113,8 +113,7 @@ def test_all_stays_beside_what_is_removed(random: Random, has_comments: bool) ->
     writer = Writer(random, has_comments)
     writer.block(said, 0, ())
     text = "".join(one for one, _ in writer.pieces)
-    within = [path for path, _ in places(said) if path and isinstance(at(said, path[:-1]), dict)]
-    path = random.choice(within)
+    path = random.choice([path for path, _ in places(said) if path])
     if len(at(said, path[:-1])) == 1:
         return
     expected = copy.deepcopy(said)
@@ -177,6 +176,9 @@ def test_places_that_others_share_are_refused(text: str, change: TextChange, pla
         ("a: &x 1\nc: *x\nd: 1", TextChange(("d",), 2), "a: &x 1\nc: *x\nd: 2"),
         ("a: # empty\nb: 1\n", TextChange(("a",), 2), "a: 2 # empty\nb: 1\n"),
         ("a:\n- 1\nb: 1\n", TextChange(("a",), 2, "append"), "a:\n- 1\n- 2\nb: 1\n"),
+        ("a:\n- b: 1\n", TextChange(("a",), {"b": 2, "c": 3}, "append"),
+         "a:\n- b: 1\n- b: 2\n  c: 3\n"),
+        ("a:\n- {b: 1}\n", TextChange(("a",), {"b": 2}, "append"), "a:\n- {b: 1}\n- {b: 2}\n"),
         ("a: [1,\n    2 # two\n   ]\n", TextChange(("a",), 3, "append"),
          "a: [1,\n    2, # two\n    3\n   ]\n"),
         ("a: [1,\n    2, # two\n   ]\n", TextChange(("a",), 3, "append"),

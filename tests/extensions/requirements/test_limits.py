@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -12,13 +13,7 @@ import numpy as np
 import pytest
 from ballplate.extensions.requirements.answers import Answer
 from ballplate.extensions.requirements.goals import Judgement, judge, parse_goal
-from ballplate.extensions.requirements.root_search import (
-    Tried,
-    _scanned,
-    _Searched,
-    _Trials,
-    reach,
-)
+from ballplate.extensions.requirements.root_search import Tried, _scanned, _Searched, _Trials, reach
 from ballplate.extensions.requirements.unknowns import NotVariableError, unknown
 from ballplate.results.checked_designs import predict
 from ballplate.simulator.experiment.loading import load
@@ -27,6 +22,7 @@ from tests.extensions.requirements import wording
 from tests.planning.small_pool import TEXT
 from tests.reference.small_quickstart import small_quickstart
 
+ONLY = {"name": "only", "plane": "z", "level": "100 mm", "corner": {"x": "0 mm", "y": "0 mm"}}
 STEEL = {"value": "11.5 um/m/K", "standard_uncertainty": "0 um/m/K"}
 
 
@@ -180,3 +176,51 @@ def test_a_certificate_is_varied_with_what_its_values_have_in_common() -> None:
     half = {**item, "standard_uncertainty": own, "common": common}
     found = bp.run(stated.with_({"calibration": [half]})).quantities["U6"].average
     assert 0.995 < found / (0.4 * present + 0.6 * least) <= 1.0
+
+
+@pytest.mark.parametrize("columns, rows", [(6, 4), (3, 5), (2, 40)])
+def test_grids_are_all_nearly_in_proportion_by_their_number(columns: int, rows: int) -> None:
+    experiment = small_quickstart(**FEW).with_({"artefacts.plate.balls": [columns, rows]})
+    sought = unknown("balls", experiment, experiment.tree, None, None)
+    words = [sought.words(step).split(" x ") for step in range(sought.first, sought.last + 1)]
+    found = [(int(n), int(m)) for n, m in words]
+    assert sorted(found) == [
+        (n, m)
+        for n, m in product(range(2, max(30, rows) + 1), repeat=2)
+        if min(abs(n - m * columns / rows), abs(m - n * rows / columns)) <= 1.0 + 1e-12
+    ]
+    apart = [(n * m, abs(n * rows - m * columns)) for n, m in found]
+    assert apart == sorted(apart) and found[sought.drawn] == (columns, rows)
+
+
+def test_what_no_size_determines() -> None:
+    """From a twentieth of the plate to the largest in a volume of a metre."""
+    few = small_quickstart(**FEW)
+    (found,) = bp.reach(
+        few.with_({"positions": [ONLY | {"probes": ["down"]}]}), "U6 average 1 um", "size"
+    ).answers
+    assert found.status == "undetermined" and wording.NO_SIZE_DETERMINES in found.remarks[0]
+
+
+def test_goals_are_judged_by_what_is_predicted() -> None:
+    """Two tasks, of which one may exceed its target; lengths at their share, below and above."""
+    ends = {"near": "100 mm", "far": "1 m"}.items()
+    tasks = [{"name": k, "from": ["0 mm"] * 3, "to": [end, "0 mm", "0 mm"]} for k, end in ends]
+    experiment = small_quickstart(evaluation=FEW["evaluation"] | {"tasks": tasks})
+    near, far = (task.standard_uncertainty for task in predict(experiment).tasks)
+    for target, count in ((0.5 * (near + far), 1), (1.1 * far, 2)):
+        planned = predict(experiment.with_({"target_uncertainty": f"{1e6 * target:.9f} um"}))
+        u6 = planned.quantities["U6"]
+        share, one = float(u6.within_target or 0.0), 1.0 / u6.count
+        told = "all" if share == 1.0 else f"{100 * share:.4g} % of"
+        largest, ratio = f" {1e6 * u6.maximum:.4g} µm", far / target
+        for goal, asked, is_met, distance, words, more in (
+            ("tasks", None, count == 2, ratio, f"{count} of 2 tasks", f" far, {100 * ratio:.4g} %"),
+            ("lengths", share, True, 1 - share, f"{told} lengths", f" {1e6 * u6.average:.4g} µm"),
+            ("lengths", share + one, False, 1 - share, f"{told} lengths", " µm"),
+            (f"U6 maximum {1.01 * u6.maximum} m", None, True, 1 / 1.01, "maximum U6", largest),
+            (f"U6 maximum {0.99 * u6.maximum} m", None, False, 1 / 0.99, "maximum U6", largest),
+        ):
+            found = judge(parse_goal(goal, asked), planned)
+            assert found.is_met is is_met and found.distance == pytest.approx(distance)
+            assert found.words.startswith(words) and found.words.endswith(more)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import ballplate as bp
 import numpy as np
 import pytest
+from ballplate.extensions.studio.answers import motions
 from ballplate.extensions.studio.motions import (
     Motion,
     moved_balls,
@@ -91,3 +92,22 @@ def test_in_a_weak_direction_balls_go_where_least_squares_take_them() -> None:
         for ball in free:
             mean = wanted[readings.ball == ball].mean(axis=0)
             np.testing.assert_allclose(motion.balls[ball], mean, rtol=1e-5, atol=1e-12)
+
+
+@pytest.mark.parametrize(("path", "variant"), DESIGNS)
+def test_what_is_drawn_changes_distances_as_the_motion_does(path: str, variant: str | None) -> None:
+    """Without the rigid motion that they have in common, and with a largest displacement of one."""
+    _, at = laid_out(path, variant)
+    readings = at.design.readings.select(at.design.plate_readings)
+    places = locations(at.design, at.state, readings)
+    for index, motion in enumerate(null_motions(at)):
+        drawn = motions(at, None, index)
+        assert drawn is not None
+        directions = np.concatenate([*drawn["direction"].values()])
+        assert np.linalg.norm(directions, axis=1).max() == pytest.approx(1.0, abs=1e-3)
+        moved = moved_balls(at, motion, readings), drawn["direction"]["readings"]
+        apart = np.diff(places[::7], axis=0)
+        expected, rates = ((np.diff(one[::7], axis=0) * apart).sum(axis=1) for one in moved)
+        scale = rates @ expected / (expected @ expected)
+        np.testing.assert_allclose(rates, scale * expected, atol=3e-4)
+        assert scale > 0.0 and drawn["position"].tolist() == readings.position.tolist()

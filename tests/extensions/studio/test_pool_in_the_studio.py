@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import re
 import time
 
 import ballplate as bp
 import pytest
+import yaml
 
 pytest.importorskip("starlette", reason="the studio is an extra")
 
@@ -50,6 +52,31 @@ def test_a_pool_that_fills_the_volume_is_a_group_for_each_plane(document):
     assert again.text.count("planes:") == 1 and "count: 2" in again.text
     again = done(again, FILL)
     assert planned(again).pool is not None and again.text.count("planes:") == 3
+
+
+@pytest.mark.parametrize("edge", [0.0, 20.0])
+def test_groups_reach_from_end_to_end(document, edge: float) -> None:
+    """Balls and readings, in whole tenths of a millimetre, `edge` from the walls beside them."""
+    sides, text = (
+        [512.34, 300.06],
+        document.text.replace("[750 mm, 750 mm]", "[512.34 mm, 300.06 mm]"),
+    )
+    text += f"pool: {{limits: {{edge: {edge} mm}}}}\n" if edge else ""
+    said = yaml.safe_load(done(done(document, {"do": "text", "text": text}), FILL).text)
+    groups = said["pool"]["candidates"]
+    assert len(groups) == 6
+    for group in groups:
+        (plane,), offsets = group["planes"], [said["probes"][name] for name in group["probes"]]
+        in_plane = sides[:: -1 if group["quarter_turns"] else 1]
+        places = {plane: group["levels"]} | group["corners"]
+        for k, axis in enumerate("xyz"):
+            ends = [0.0, *(float(one[k].split()[0]) for one in offsets)]
+            low, high = max(ends), 1000.0 + min(ends)
+            if axis != plane:
+                u = {"x": "yz", "y": "zx", "z": "xy"}[plane].index(axis)
+                low, high = low + edge, high - edge - in_plane[u]
+            expected = f"{math.ceil(10 * low) / 10:g} mm", f"{math.floor(10 * high) / 10:g} mm"
+            assert (places[axis]["from"], places[axis]["to"]) == expected
 
 
 def test_a_corner_is_forbidden_and_allowed_again(document):

@@ -153,8 +153,7 @@ def test_changes_that_are_left_on_purpose_are_gone(design):
 
 
 @pytest.mark.parametrize(
-    "content",
-    ["{", '{"text": 1}', '{"text": "x", "content": "?"}', "[" * 100_000, "\xff"],
+    "content", ["{", '{"text": 1}', '{"text": "x", "content": "?"}', "[" * 100_000, "\xff"]
 )
 def test_what_cannot_be_read_is_told_and_never_written_over(design, content):
     kept_in(design).write_text(content, encoding="latin-1")
@@ -341,12 +340,3 @@ def test_what_was_not_saved_does_not_exchange_the_model_in_python_of_a_file(desi
         other = f"{said['text']}\nvariants:\n  v:\n    {variant}\n"
         kept_in(design).write_text(json.dumps(said | {"text": other}))
         assert "not restored" in Session(design).state()["note"] and not ran.exists()
-
-
-def test_no_later_change_runs_what_came_with_a_text_that_was_not_saved(design, ran):
-    session = Session(design)
-    session.act({"do": "set", "path": ["title"], "value": "mine"})
-    again = Session(design)
-    again.act({"do": "text", "text": in_python(design.read_text())})
-    assert any("Python" in one["text"] for one in again.state()["messages"])
-    assert not ran.exists()

@@ -99,8 +99,7 @@ def test_a_form_of_another_page_cannot_act(client, session):
 
 
 @pytest.mark.parametrize(
-    "name",
-    ["../other.yaml", "/etc/passwd", "sub/other.yaml", "other.txt", "", "..", "link.yaml"],
+    "name", ["../other.yaml", "/etc/passwd", "sub/other.yaml", "other.txt", "", "..", "link.yaml"]
 )
 def test_files_outside_the_folder_are_refused(client, design, tmp_path_factory, name):
     elsewhere = tmp_path_factory.mktemp("elsewhere") / "other.yaml"

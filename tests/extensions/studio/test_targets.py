@@ -40,13 +40,6 @@ def verdict(found: DesignDocument) -> str:
     return word
 
 
-@pytest.mark.parametrize(
-    ("target", "word"), [("0.5 um", "met"), ("0.3 um", "missed"), ("1 nm", "missed"), ("", "")]
-)
-def test_all_lengths_meet_a_target_or_it_is_missed(target, word):
-    assert verdict(with_values(target_uncertainty=target)) == word
-
-
 def test_one_length_of_many_is_enough_to_miss_a_target():
     """The largest U6 is between these two targets, and nearly all lengths are below both."""
     largest = next(
@@ -57,6 +50,7 @@ def test_one_length_of_many_is_enough_to_miss_a_target():
     for factor, word in ((1 + 1e-6, "met"), (1 - 1e-6, "missed")):
         target = f"{factor * 1e6 * largest:.9f} um"
         assert verdict(with_values(target_uncertainty=target)) == word
+    assert verdict(with_values(target_uncertainty="")) == ""
 
 
 def test_an_undetermined_design_misses_its_target_or_leaves_it_undecided():

@@ -30,13 +30,7 @@ from ballplate.extensions.sweeps.store import (
 from ballplate.extensions.sweeps.task import CellResult, CellTask, compute
 
 from tests.extensions.sweeps import wording
-from tests.extensions.sweeps.odd_stores import (
-    DAMAGED,
-    NO_STORES,
-    by_sql,
-    settled,
-    signed,
-)
+from tests.extensions.sweeps.odd_stores import DAMAGED, NO_STORES, by_sql, settled, signed
 from tests.extensions.sweeps.support import assert_same, rows, small_sweep
 from tests.reference.tables import read_table
 

@@ -107,11 +107,7 @@ def test_a_link_to_a_file_outside_is_refused(folder: Path) -> None:
         load_sweep(folder / "s.yaml")
 
 
-ROOTED = (
-    "C:\\balls.csv",
-    "/balls.csv",
-    "~/balls.csv",
-)
+ROOTED = ("C:\\balls.csv", "/balls.csv", "~/balls.csv")
 
 
 def files_of(folder: Path, text: str) -> list[Path]:

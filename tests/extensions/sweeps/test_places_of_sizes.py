@@ -36,22 +36,6 @@ def notes(folder: Path, text: str, variants: str) -> list[tuple[str, ...]]:
     return [experiment.notes for experiment in load(path)]
 
 
-@pytest.mark.parametrize(
-    ("size", "kept", "following"),
-    [(450, (0.684, 2.63), (0.345, 0.81)), (550, (0.363, 1.49), (0.222, 0.50))],
-)
-def test_plates_that_stay_are_worse_here(
-    size: int, kept: tuple[float, float], following: tuple[float, float], tmp_path: Path
-) -> None:
-    """Against figures of designs made by hand."""
-    for text, expected in ((LENGTHS, kept), (TEXT, following)):
-        u6 = bp.run(
-            bp.load(written(tmp_path, text)).with_({"artefacts.plate.size": [f"{size} mm"] * 2})
-        ).quantities["U6"]
-        assert 1e6 * u6.average == pytest.approx(expected[0], abs=6e-4)
-        assert 1e6 * u6.maximum == pytest.approx(expected[1], abs=6e-3)
-
-
 def test_following_is_what_one_would_write_by_hand(tmp_path: Path) -> None:
     size = "artefacts.plate.size"
     followed = bp.load(written(tmp_path, TEXT)).with_({size: ["450 mm", "600 mm"]})

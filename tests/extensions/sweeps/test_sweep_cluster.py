@@ -17,11 +17,7 @@ from pathlib import Path
 import pytest
 from ballplate.cli import main
 from ballplate.extensions.sweeps import cluster
-from ballplate.extensions.sweeps.cluster import (
-    ClusterError,
-    OtherVersionError,
-    _on_worker,
-)
+from ballplate.extensions.sweeps.cluster import ClusterError, OtherVersionError, _on_worker
 from ballplate.extensions.sweeps.task import CellTask
 
 from tests.extensions.sweeps import wording
@@ -129,10 +125,7 @@ def test_workers_with_other_code_are_refused(
 ) -> None:
     address, _ = scheduler
     path = small_sweep(tmp_path, 2)
-    for other, words in (
-        (OTHER, "ballplate 0.0.7"),
-        (OTHER_CODE, "other code of ballplate 0.1.0"),
-    ):
+    for other, words in ((OTHER, "ballplate 0.0.7"), (OTHER_CODE, "other code of ballplate 0.1.0")):
         worker = start("-c", other + SERVE, address)
         err = ended(path, address)
         assert f" has {words}, and this is ballplate 0.1.0; install the same ballplate on" in err

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
 import pytest
 from ballplate.extensions.sweeps.load import experiment_of, load_sweep
 from ballplate.extensions.sweeps.model import Sweep
-from ballplate.extensions.sweeps.values import subset_count
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 
@@ -64,21 +64,6 @@ def test_every_combination_is_a_cell(written: Written) -> None:
     assert len(experiment.layouts["plate"].names) == 16
 
 
-def test_a_cell_is_the_experiment_that_a_variant_would_be(written: Written, tmp_path: Path) -> None:
-    sweep = load_sweep(
-        written("axes:\n  level: {path: 'positions[z low].level', values: [100 mm]}\n")
-    )
-    text = (tmp_path / "quickstart.yaml").read_text(encoding="utf-8")
-    (tmp_path / "v.yaml").write_text(
-        text + 'variants: {one: {"positions[z low].level": 100 mm}}\n', encoding="utf-8"
-    )
-    (expected,) = load(tmp_path / "v.yaml")
-    found = experiment_of(sweep, 0)
-    for one, other in zip(found.positions, expected.positions, strict=True):
-        np.testing.assert_array_equal(one.pose.origin, other.pose.origin)
-        np.testing.assert_array_equal(one.pose.rotation, other.pose.rotation)
-
-
 def test_values_that_change_together(written: Written) -> None:
     together = (
         'together: {"positions[z low].level": [100 mm, 200 mm], "positions[z high].level": [900 mm,'
@@ -107,23 +92,33 @@ def test_named_values_and_conditions(written: Written) -> None:
     ]
     assert labels(
         load_sweep(written(text + "only: [{size: small}, {balls: {above: 5}, size: 0.75 m}]\n"))
-    ) == [
-        *(f"size small, balls {balls}" for balls in (4, 5, 7)),
-        "size large, balls 7",
-    ]
+    ) == [*(f"size small, balls {balls}" for balls in (4, 5, 7)), "size large, balls 7"]
 
 
-def test_subsets_of_positions(written: Written) -> None:
-    sweep = load_sweep(
-        written(
-            "axes:\n  strategy:\n    path: positions\n    subsets: {sizes: [3, 6], always: [x low],"
-            " among: [z low, z high, y low, y high, x high]}\n"
-        )
-    )
-    assert len(sweep.cells) == 10 + 1 == subset_count(6, 1, (3, 6))
-    assert [sweep.axes[0].choices[k].label for k in (0, 10)] == ["z low + z high + x low", "all"]
-    assert [one.name for one in experiment_of(sweep, 0).positions] == ["z low", "z high", "x low"]
-    assert len(experiment_of(sweep, 10).positions) == 6
+@pytest.mark.parametrize("always, among", [("", "abcdef"), ("c", "abf"), ("bd", "")])
+def test_subsets_are_all_of_a_size(always: str, among: str, written: Written) -> None:
+    (base,) = load(Path("designs/quickstart.yaml"))
+    names = dict(zip("abcdef", (one.name for one in base.positions), strict=True))
+    fewest, most = max(len(always), 1), len({*always, *among})
+
+    def subsets(*sizes: int) -> Path:
+        chosen = f"always: {[names[k] for k in always]}, among: {[names[k] for k in among]}"
+        subsets = f"{{sizes: {[*sizes]}, {chosen}}}"
+        return written(f"axes: {{kept: {{path: positions, subsets: {subsets}}}}}\n")
+
+    sizes = range(fewest, most + 1)
+    sweep = load_sweep(subsets(*sizes))
+    every = (some for size in sizes for some in combinations("abcdef", size))
+    expected = [some for some in every if {*always} <= {*some} <= {*always, *among}]
+    for cell, some in enumerate(expected):
+        kept, others = [names[k] for k in some], [names[k] for k in "abcdef" if k not in some]
+        words = f"all but {' and '.join(others)}" if others else "all"
+        words = words if 2 * len(others) < len(kept) else " + ".join(kept)
+        assert sweep.axes[0].choices[cell].label == words
+    assert [one.name for one in experiment_of(sweep, len(expected) - 1).positions] == kept
+    assert len(sweep.cells) == len(expected)
+    for size in {max(fewest - 1, 1), most + 1} - {fewest}:
+        assert f" {size} entries; give {fewest} to {most}" in refusal(subsets(size))[0]
 
 
 def test_variants_are_an_axis(written: Written, tmp_path: Path) -> None:

@@ -26,14 +26,7 @@ from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 
 from tests.extensions.sweeps import wording
-from tests.extensions.sweeps.support import (
-    ROOT,
-    assert_same,
-    command,
-    rows,
-    run,
-    small_sweep,
-)
+from tests.extensions.sweeps.support import ROOT, assert_same, command, rows, run, small_sweep
 
 
 def sweep(path: Path, *options: str) -> int:
@@ -167,6 +160,9 @@ def test_a_changed_base_is_refused_with_what_changed(
     one, two = (results(store, k, 4).figures["U1_average_m"][0] for k in (1, 2))
     assert two > 1.1 * one
     store.close()
+    # It is compared with the last one.
+    base.write_text(text.replace("repeatability: 0.2 um", "repeatability: 0.4 um"), "utf-8")
+    assert sweep(path) == 3 and "'0.3 um' has become '0.4 um'" in capsys.readouterr().err
 
 
 def test_a_change_while_a_sweep_runs_is_noticed(
@@ -269,7 +265,9 @@ def test_dry_run_lists_the_cells(tmp_path: Path, capsys: pytest.CaptureFixture[s
     # The last of the cells that were tried does not fit.
     assert "estimated from 3\ncase 3 fails: " in err
     assert out.splitlines()[1] == "1: size 700 mm, balls 5" and len(out.splitlines()) == 4
-    assert err.startswith("4 cases, about ") and not (tmp_path / "small.sqlite").exists()
+    assert (
+        re.match("4 cases, about [0-9.]+ (s|min)", err) and not (tmp_path / "small.sqlite").exists()
+    )
 
 
 def test_export(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -18,10 +18,15 @@ from typing import Any
 
 import pytest
 from ballplate.cli import main
+from ballplate.extensions.sweeps.execute import run_sweep
+from ballplate.extensions.sweeps.load import load_sweep
+from ballplate.extensions.sweeps.task import CellResult
+from ballplate.simulator.computing import ProgressStep
 
 from tests.cli.cuts import COMMIT, remains
 from tests.cli.test_outputs import BALLS, DESIGN
 from tests.extensions.sweeps import wording
+from tests.extensions.sweeps.stores import axis, made_up
 from tests.extensions.sweeps.support import (
     ROOT,
     assert_same,
@@ -206,3 +211,35 @@ def test_one_writer_at_a_time_which_can_be_interrupted(
     assert process.returncode == 130, err
     assert wording.THE_SAME_COMMAND_CONTINUES_FROM_THERE in err and "Traceback" not in err
     assert 2 < stored(store) < 80
+
+
+@pytest.mark.parametrize("fail_fast", [False, True])
+def test_a_run_reports_each_row(
+    fail_fast: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Seven blocks of data sets of four cells, of at most 16 at once; a block of one fails."""
+    monkeypatch.setattr("ballplate.extensions.sweeps.task.BLOCK", 100)
+    sweep = load_sweep(small_sweep(tmp_path, 2, "trials: 650\n"))
+    calls, told, steps = [], list[CellResult](), list[ProgressStep]()
+
+    def runner(tasks):
+        calls.append([(task.number, task.block) for task in tasks])
+        for task in tasks:
+            status = "failed" if (task.number, task.block) == (1, 4) else "done"
+            told.append(CellResult(task.number, task.block, f"key {task.number}", status, "why"))
+            yield told[-1]
+
+    with closing(made_up(tmp_path / "s.sqlite", "s", [axis("k", "abcd")], [])) as store:
+        summary = run_sweep(store, 1, sweep, runner, fail_fast=fail_fast, report=steps.append)
+    blocks = [[(k, block) for k in pair for block in range(1, 8)] for pair in ((0, 1), (2, 3))]
+    every = [blocks[0], [(0, 0)], blocks[1], [(2, 0), (3, 0)]]
+    assert calls == (every[:1] if fail_fast else every)
+    assert len(told) == (7 + 4 if fail_fast else 14 + 1 + 14 + 2)
+    for k, step in enumerate(steps):
+        failed = sum(row.status == "failed" for row in told[:k])
+        done = sum(row.block == 0 for row in told[:k]) + failed
+        count = sum(row.block > 0 for row in told[:k]) - failed
+        words = [f"{count} block{'s' * (count > 1)} of data sets"] * (count > 0)
+        words = [f"{done} of 4 cases", *words, *[f"{failed} failed"] * failed]
+        assert str(step) == ", ".join(words)
+    assert (len(steps), summary.failed, summary.done) == (1 + len(told), 1, 3 - 3 * fail_fast)
