@@ -10,9 +10,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.cli import main
+from ballplate.presentation import number
+
+from tests.reference.small_quickstart import small_sections
 
 QUICKSTART = "designs/quickstart.yaml"
 Rows = list[dict[str, str]]
@@ -63,23 +67,79 @@ def test_a_length_that_nothing_checks_is_dangerous(capsys: pytest.CaptureFixture
 
 
 def test_sigma_given_is_the_normal_test(capsys: pytest.CaptureFixture[str]) -> None:
-    options = ["--sigma", "given", "--false-alarm", "5%", "--power", "90%", "--json"]
-    assert (
-        main(
-            [
-                "run",
-                "--reliability",
-                "designs/hurt_foss/bar-bell.yaml",
-                "--variant",
-                "flat",
-                *options,
-            ]
-        )
-        == 0
-    )
+    options = ["--sigma", "given", "--false-alarm", "5%", "--power", "90%"]
+    file = ["designs/hurt_foss/bar-bell.yaml", "--variant", "flat"]
+    assert main(["run", "--reliability", *file, *options, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["noncentrality"] == pytest.approx(
         1.959964 + 1.281552, abs=1e-4
     )
+    assert main(["run", "--reliability", *file, *options]) == 0
+    words = "power of 90 % by a test with a false alarm of 5 %, sigma as given: 3.242 standard"
+    assert words in capsys.readouterr().out
+
+
+def one_distance() -> bp.Experiment:
+    """Nothing but one distance tells the scale, and nothing checks it."""
+    prior = {"parameter": "EXX[2]", "value": "0 um", "standard_uncertainty": "1 um"}
+    distance = {"kind": "distances", "pairs": [["r1c1", "r1c3"]], "standard_uncertainty": "1 um"}
+    told = small_sections(calibration=[distance], priors=[prior], probes={"down": ["0 mm"] * 3})
+    positions = [one | {"probes": ["down"]} for one in told["positions"]]
+    return bp.experiment(told | {"positions": positions})
+
+
+@pytest.mark.parametrize("make", [bp.quickstart, one_distance])
+def test_text_says_what_the_data_say(make: Callable[[], bp.Experiment]) -> None:
+    found = bp.reliability(make())
+    told, lines = found.to_dict(), found.lines()
+    singles = told["observations_by_name"]
+    biases = {one["name"]: one for one in (*singles, *told["events"])}
+
+    def cell(value: float | None) -> str:
+        return "never" if value is None else number(1e6 * value, 3)
+
+    def order(bias: dict[str, Any]) -> tuple[bool, float, float]:
+        """What no test finds although it changes lengths comes first."""
+        sizes = (bias["effects"][symbol].get("change", 0.0) for symbol in ("U6", "U5"))
+        return (bias.get("harmless", True), *(-size for size in sizes))
+
+    for heading in ("worst readings", "worst items", "events"):
+        start = next(k for k, line in enumerate(lines) if line.startswith(heading)) + 1
+        rows = [re.split("  +", line) for line in lines[start : lines.index("", start)]]
+        for name, *row in rows:
+            bias = biases[name]
+            assert (bias.get("redundancy", 1.0) < 1e-9) == (row[0] == "0")
+            expected = [number(bias["redundancy"], 3)] if heading != "events" else []
+            detectable = cell(bias["minimal_detectable"])
+            by_fit = "-" if name.startswith("drift") else cell(bias["found_by_fit"])
+            expected += [detectable, by_fit, {"m": "µm", "rad": "µrad", "1": "ppm"}[bias["unit"]]]
+            for one in bias["effects"].values():
+                size, u = (one.get(key, 0.0) for key in ("change", "standard_uncertainty"))
+                expected.append(f"{cell(size)} ({cell(u)})" if "change" in one else "-")
+            at = bias["effects"]["U6"]["at"]
+            assert row == expected + [at] * (detectable != "never"), name
+        chosen = [
+            one for one in singles if (one["kind"] == "reading") == (heading[6:] == "readings")
+        ]
+        if heading != "events":
+            assert [row[0] for row in rows] == [
+                one["name"] for one in sorted(chosen, key=order)[:5]
+            ]
+    positions = lines[lines.index("") + 2 :]
+    for row in (re.split("  +", line) for line in positions[: positions.index("")]):
+        there = [
+            one for one in singles if re.search(f" in position {row[0]}( with|,)", one["name"])
+        ]
+        left = [one["redundancy"] for one in there]
+        by_bias = max(there, key=lambda one: one["minimal_detectable"])
+        by_effect = max(there, key=lambda one: one["effects"]["U6"]["change"])
+        u6 = (by_effect["effects"]["U6"][key] for key in ("change", "standard_uncertainty"))
+        assert row[1:] == [
+            *(str(len(there) // 3), number(min(left), 3), number(sum(left) / len(left), 3)),
+            *(cell(by_bias["minimal_detectable"]), cell(by_bias["found_by_fit"])),
+            by_bias["name"].replace(f" in position {row[0]}", ""),
+            "{} ({})".format(*map(cell, u6)),
+            by_effect["name"].replace(f" in position {row[0]}", ""),
+        ]
 
 
 @pytest.mark.parametrize(
