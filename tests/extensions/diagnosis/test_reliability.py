@@ -13,12 +13,14 @@ from typing import Any
 import ballplate as bp
 import numpy as np
 import pytest
+import scipy.stats
 from ballplate.cli import main
 from ballplate.presentation import number
 
 from tests.reference.small_quickstart import small_sections
 
 QUICKSTART = "designs/quickstart.yaml"
+BAR_BELL = "designs/hurt_foss/bar-bell.yaml"
 Rows = list[dict[str, str]]
 
 
@@ -43,19 +45,8 @@ def test_table_of_the_quickstart(tmp_path: Path, capsys: pytest.CaptureFixture[s
 
 
 def test_a_length_that_nothing_checks_is_dangerous(capsys: pytest.CaptureFixture[str]) -> None:
-    assert (
-        main(
-            [
-                "run",
-                "--reliability",
-                "designs/hurt_foss/bar-bell.yaml",
-                "--variant",
-                "length known",
-                "--json",
-            ]
-        )
-        == 0
-    )
+    options = ["--variant", "length known", "--json"]
+    assert main(["run", "--reliability", BAR_BELL, *options]) == 0
     found = json.loads(capsys.readouterr().out)
     by_name = {event["name"]: event for event in found["events"]}
     certificate = by_name["certified length 1-2 of bar"]
@@ -68,7 +59,7 @@ def test_a_length_that_nothing_checks_is_dangerous(capsys: pytest.CaptureFixture
 
 def test_sigma_given_is_the_normal_test(capsys: pytest.CaptureFixture[str]) -> None:
     options = ["--sigma", "given", "--false-alarm", "5%", "--power", "90%"]
-    file = ["designs/hurt_foss/bar-bell.yaml", "--variant", "flat"]
+    file = [BAR_BELL, "--variant", "flat"]
     assert main(["run", "--reliability", *file, *options, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["noncentrality"] == pytest.approx(
         1.959964 + 1.281552, abs=1e-4
@@ -91,7 +82,10 @@ def one_distance() -> bp.Experiment:
 def test_text_says_what_the_data_say(make: Callable[[], bp.Experiment]) -> None:
     found = bp.reliability(make())
     told, lines = found.to_dict(), found.lines()
-    singles = told["observations_by_name"]
+    singles, freedom = told["observations_by_name"], told["degrees_of_freedom"] - 1
+    limit = scipy.stats.f.isf(0.001, 1, freedom)
+    power = scipy.stats.ncf.sf(limit, 1, freedom, told["noncentrality"] ** 2)
+    assert power == pytest.approx(0.8, rel=1e-6)
     biases = {one["name"]: one for one in (*singles, *told["events"])}
 
     def cell(value: float | None) -> str:
@@ -158,18 +152,7 @@ def test_wrong_shares(options: list[str], told: str, capsys: pytest.CaptureFixtu
 
 
 def test_one_table_is_of_one_experiment(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert (
-        main(
-            [
-                "run",
-                "--reliability",
-                "designs/hurt_foss/bar-bell.yaml",
-                "-o",
-                str(tmp_path / "t.csv"),
-            ]
-        )
-        == 2
-    )
+    assert main(["run", "--reliability", BAR_BELL, "-o", str(tmp_path / "t.csv")]) == 2
     assert "choose one with --variant: length known, " in capsys.readouterr().err
     own = tmp_path / "own.yaml"
     own.write_text(Path(QUICKSTART).read_text(encoding="utf-8"), encoding="utf-8")

@@ -187,33 +187,6 @@ def test_tests_and_changes_of_lengths_are_as_defined(sigma: Literal["estimated",
     assert found.lines()[-1].endswith(f" {min(one['chance'] for one in told):.2g}")
 
 
-def test_the_change_of_a_length_scatters_as_it_says() -> None:
-    """Over campaigns: the standardised change of the length that changes most, of all campaigns
-    together, against the normal distribution of the largest of many.
-    """
-    design = lay_out(small())
-    standardised = []
-    for seed in range(6):
-        observed = campaign(design, 100 + seed)
-        found = validate_one(observed, 1)
-        standardised.append(found)
-    rms = np.sqrt(np.mean(np.square(standardised)))
-    # Changes of different lengths are close to one another in their standard uncertainties.
-    assert 0.7 < rms < 2.2
-
-
-def validate_one(observed: ObservedReadings, position: int) -> float:
-    from ballplate.extensions.judgement.left_out import _length_difference
-
-    solution = estimate(observed.design, observed.x)
-    at = linearised_fit(observed.design, solution)
-    rest = rest_of(observed.design, observed.x, position)
-    assert rest is not None
-    found = _length_difference(at, rest, 1.0)
-    assert found is not None
-    return found.change / found.standard_uncertainty
-
-
 def test_a_shifted_reading_is_found_where_it_is() -> None:
     observed = campaign(lay_out(small()), 4)
     x = observed.x.copy()

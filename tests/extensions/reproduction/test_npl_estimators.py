@@ -51,4 +51,5 @@ def test_the_reports_differences_lie_in_the_distribution(  # type: ignore[no-unt
         sum(one < difference.maximum for one in made[0].maximum) / trials,
     ]
     # The published one is neither the least nor the largest.
+    assert found[1].within == found[3].within == (1 / npl().limits.median, npl().limits.median)
     assert found[2].within == found[4].within == pytest.approx((1 / trials, 1 - 1 / trials))
