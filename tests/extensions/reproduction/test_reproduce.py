@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -68,6 +69,9 @@ def told(capsys: pytest.CaptureFixture[str], status: int, *options: str) -> str:
         cells += [] if row["ratio"] is None else [f"{row['ratio']:#.4g}"]
         cells += [f"{low:g}" if low == high else limits, "yes" if row["agrees"] else "NO"]
         assert line.split() == " ".join([*cells, row["note"]]).split()
+    assert "within 10 %, and the factor within 15 %, unless" in text
+    tables = [table for table in npl().illegible if table in {row["table"] for row in rows}]
+    assert re.findall(r"^Not legible .*: Table (\w+)", text, re.MULTILINE) == tables
     agree = sum(row["agrees"] for row in rows)
     assert err == "" and (agree == len(rows)) == (status == 0)
     assert text.rstrip().endswith(f": {agree} of {len(rows)}.")
@@ -79,6 +83,7 @@ def test_text_of_one_experiment(capsys: pytest.CaptureFixture[str]) -> None:
     assert "Section 6.2.5" in out and "Section 6.2.1" not in out
     assert "k: the two further" not in out and "l: the standard lies" in out
     assert out.count("Exceptions\nnone\n") == 1
+    assert "Not legible" in told(capsys, 0, "--experiment", "6.2.6")
 
 
 def test_what_differs_is_seen(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
