@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from ballplate.cli import main
 from ballplate.extensions.reproduction.published import npl
+from ballplate.presentation import number
 
 from tests.extensions.reproduction import wording
 
@@ -65,8 +66,8 @@ def told(capsys: pytest.CaptureFixture[str], status: int, *options: str) -> str:
         limits = f"at least {low:g}" if high is None else f"{low:g} to {high:g}"
         cells = [row[name] for name in ("table", "quantity", "case")]
         for value in filter(lambda value: value is not None, (row["published"], row["computed"])):
-            cells.append(f"{1e6 * value:#.5g}" if row["unit"] else f"{value:.4g}")
-        cells += [] if row["ratio"] is None else [f"{row['ratio']:#.4g}"]
+            cells.append(number(1e6 * value, 5) if row["unit"] else f"{value:.4g}")
+        cells += [] if row["ratio"] is None else [number(row["ratio"], 4)]
         cells += [f"{low:g}" if low == high else limits, "yes" if row["agrees"] else "NO"]
         assert line.split() == " ".join([*cells, row["note"]]).split()
     assert "within 10 %, and the factor within 15 %, unless" in text
