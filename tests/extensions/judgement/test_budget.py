@@ -16,7 +16,7 @@ import pytest
 import yaml
 from ballplate.cli import main
 from ballplate.extensions.certificates.certificate_files import certified_values, with_values
-from ballplate.extensions.judgement.budget import UncertaintyBudget
+from ballplate.extensions.judgement.budget import BudgetFigure, UncertaintyBudget
 from ballplate.extensions.judgement.source_sums import source_sums, sources_of
 from ballplate.simulator.estimation.corrections import corrected_points
 from ballplate.simulator.estimation.gauss_newton import estimate
@@ -217,22 +217,6 @@ def test_sources_add_up_in_every_design() -> None:
             assert all(np.linalg.eigvalsh(one).min() > -1e-10 for one in found.sums)
 
 
-def test_what_is_undetermined_is_said(capsys: pytest.CaptureFixture[str]) -> None:
-    file = str(TOP / "designs/certified/deficient.yaml")
-    found = bp.budget(file)
-    whole = bp.run(file).quantities
-    for one in found.figures[:2]:
-        assert (one.count, one.undetermined) == (
-            whole[one.name].count,
-            whole[one.name].undetermined,
-        )
-    assert main(["run", "--budget", file]) == 0
-    line = next(
-        line for line in capsys.readouterr().out.splitlines() if line.startswith("together")
-    )
-    assert line.split()[-5] == "undetermined" and np.isnan(found.figures[1].standard_uncertainty)
-
-
 def test_a_fit_multiplies_by_its_sigma_and_says_of_few_degrees_of_freedom() -> None:
     experiment = small(sigma="estimated")
     readings = bp.simulate(experiment, seed=4)
@@ -284,7 +268,8 @@ def test_a_certificate_counts_whatever_is_said_of_the_table(
 )
 def test_text_and_table_say_what_the_data_say(name: str, by: Any) -> None:
     """Sources in the order of what they contribute, and their squares add up."""
-    found = bp.budget(TOP / "designs" / f"{name}.yaml", by=by)
+    file = TOP / "designs" / f"{name}.yaml"
+    found, whole = bp.budget(file, by=by), bp.run(file).quantities
     lines, told, rows = found.lines(), found.to_dict()["figures"], []
     names = [figure["figure"] for figure in told]
     ranking = "U4" if name.endswith("deficient") else "U6"
@@ -303,6 +288,8 @@ def test_text_and_table_say_what_the_data_say(name: str, by: Any) -> None:
         for line in lines[4 : 6 + len(shown)]:
             column.append(re.split("  +", line)[1 + k])
         assert (u is None) == (figure["count"] == figure["undetermined"])
+        counts = whole.get(figure["figure"], BudgetFigure("", "", 0.0, (), 1, 0))
+        assert (figure["count"], figure["undetermined"]) == (counts.count, counts.undetermined)
         if u is None:
             assert set(column) == {"undetermined"}
             continue
