@@ -295,7 +295,7 @@ def test_text_and_table_say_what_the_data_say(name: str, by: Any) -> None:
             continue
         squares = [one["standard_uncertainty"] ** 2 for one in figure["contributions"]]
         assert (
-            sum(squares) == pytest.approx(u**2, abs=0.0)
+            sum(squares) == pytest.approx(u**2, rel=1e-9, abs=0.0)
             and figure["expanded_uncertainty"] == 2.0 * u
         )
         assert list(map(float, column[-2:])) == pytest.approx([1e6 * u, 2e6 * u], rel=5e-4)
