@@ -250,6 +250,9 @@ def test_an_expected_map_is_compared_with(
     same = next(one for one in wider["figures"] if one["figure"] == edge["figure"])
     u = np.hypot(edge["standard uncertainty"], 0.5 * (4e-6 + 0.9e-5))
     assert same["standard uncertainty"] == pytest.approx(u, rel=1e-9)
+    # It states uncertainties of squareness errors.
+    assert main(["diff", str(machine), str(path), "--grid", "2"]) == 0
+    assert "npl-like is no measurement, and is as well known as" in capsys.readouterr().out
 
 
 def test_what_is_undetermined_is_not_compared(capsys: pytest.CaptureFixture[str]) -> None:
