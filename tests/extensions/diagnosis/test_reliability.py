@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import ballplate as bp
-import numpy as np
 import pytest
 import scipy.stats
 from ballplate.cli import main
@@ -29,19 +28,12 @@ def test_table_of_the_quickstart(tmp_path: Path, capsys: pytest.CaptureFixture[s
     assert main(["run", "--reliability", QUICKSTART, "-o", str(table)]) == 0
     out = capsys.readouterr().out
     assert "754 observations; redundancy 580.0 in total" in out
-    assert "estimated from the other residuals: 4.152 standard deviations" in out
     assert "cannot be detected, harmless: offset x of probe down, offset y of probe down" in out
     assert "DANGEROUS" not in out and "scale of the certificate of plate" in out
     rows = list(csv.DictReader(table.read_text(encoding="utf-8").splitlines()))
     singles = [row for row in rows if row["redundancy"]]
     assert len(rows) > len(singles) == 754
-    assert {row["unit"] for row in singles} == {"m"} and "MDB, µm" in out
     assert sum(float(row["redundancy"]) for row in singles) == pytest.approx(580.0)
-    worst = max(
-        (row for row in rows if row["kind"] == "reading"),
-        key=lambda row: float(row["minimal detectable"]),
-    )
-    assert all(word in worst["name"] for word in ("z high", "r1c1", "x"))
 
 
 def test_a_length_that_nothing_checks_is_dangerous(capsys: pytest.CaptureFixture[str]) -> None:
@@ -177,38 +169,9 @@ def nothing(rows: Rows) -> None:
     pass
 
 
-def one_reading(rows: Rows) -> None:
-    add(rows[39], "y_mm", 3.0)
-
-
 def three_readings(rows: Rows) -> None:
     for i, column, size in ((5, "z_mm", 2.0), (98, "x_mm", -2.0), (200, "y_mm", 2.5)):
         add(rows[i], column, size)
-
-
-def slip(rows: Rows) -> None:
-    for row in [row for row in rows if row["position"] == "z high"][12:]:
-        add(row, "y_mm", 1.2)
-
-
-def probe(rows: Rows) -> None:
-    for row in rows:
-        if row["probe"] == "left":
-            add(row, "z_mm", -2.0)
-
-
-def dirt(rows: Rows) -> None:
-    for row in rows:
-        if row["position"] == "x low" and row["ball"] == "r3c2":
-            add(row, "y_mm", 1.5)
-
-
-def warm(rows: Rows) -> None:
-    """The plate is larger by 3 ppm in one position."""
-    for row in rows:
-        if row["position"] == "z low":
-            add(row, "x_mm", 3e-3 * float(row["x_mm"]))
-            add(row, "y_mm", 3e-3 * float(row["y_mm"]))
 
 
 def warm_twice(rows: Rows) -> None:
@@ -219,25 +182,9 @@ def warm_twice(rows: Rows) -> None:
                 add(row, column, 2e-3 * float(row[column]))
 
 
-def loose_ball(rows: Rows) -> None:
-    """A ball stands 1.5 um out of the plate from one position on."""
-    for row in rows:
-        if row["position"] in ("y low", "y high") and row["ball"] == "r2c4":
-            add(row, "y_mm", 1.5)
-
-
 def late_slip(rows: Rows) -> None:
     for row in [row for row in rows if row["position"] == "x low"][33:]:
         add(row, "z_mm", -0.8)
-
-
-def restless(rows: Rows) -> None:
-    """Noise is three times as large in one position."""
-    generator = np.random.default_rng(4)
-    for row in rows:
-        if row["position"] == "x high":
-            for column in ("x_mm", "y_mm", "z_mm"):
-                add(row, column, 0.2 * 8.0**0.5 * generator.standard_normal())
 
 
 def waves(rows: Rows) -> None:
@@ -249,30 +196,13 @@ def waves(rows: Rows) -> None:
     ("spoil", "told", "sizes"),
     [
         (nothing, [], []),
-        (
-            one_reading,
-            [
-                r"reading of ball r3c5 in position z high with down \(y .* leave out line 41 of r.csv"
-            ],
-            [3e-6],
-        ),
         (three_readings, [" line 7 of", " line 100 of", " line 202 of"], [2e-6, -2e-6, 2.5e-6]),
-        (
-            slip,
-            [r"plate slipped in position z high between lines 3[678] and (39|40) of r.csv \(.*y 1"],
-            [1.2e-6],
-        ),
-        (probe, ["offset of probe (left|right), or offset of probe "], [2e-6]),
-        (dirt, ["ball r3c2 in position x low.* clean the ball, .* lines 63 and 88 of"], [1.5e-6]),
         (
             warm_twice,
             ["size of plate in position x high and size of plate in position y low "],
             [2e-6],
         ),
-        (loose_ball, ["ball r2c4 displaced from position y low on"], [1.5e-6]),
         (late_slip, ["slipped in position x low between lines 8[0-5] and 8[5-9] of"], [-0.8e-6]),
-        (warm, ["size of plate in position z low .* check the temperature there"], [3e-6]),
-        (restless, ["readings in position x high vary [23].* times as much"], [None]),
         (waves, ["the error model lacks an error in x that depends on x"], [None]),
     ],
 )
@@ -285,8 +215,15 @@ def test_what_a_fit_contradicts(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     # With hundreds of degrees of freedom both tests find the same.
-    sigma = "given" if spoil in (nothing, dirt, three_readings, late_slip) else "estimated"
-    found = suspected(spoil, sigma, clean, tmp_path, capsys)
+    sigma = "given" if spoil in (nothing, three_readings, late_slip) else "estimated"
+    rows = [dict(row) for row in clean]
+    spoil(rows)
+    with (tmp_path / "r.csv").open("w", encoding="utf-8", newline="") as stream:
+        writer = csv.DictWriter(stream, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+    assert main(["fit", QUICKSTART, str(tmp_path / "r.csv"), "--sigma", sigma, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)["diagnosis"]["contradicted"]
     words = [one["words"] for one in found]
     assert len(words) == len(told), words
     for pattern, size in zip(told, sizes, strict=True):
@@ -298,21 +235,3 @@ def test_what_a_fit_contradicts(
             )
             value = best["value"] if spoil in (three_readings, late_slip) else abs(best["value"])
             assert abs(value - size) < 3.5 * best["standard_uncertainty"]
-
-
-def suspected(
-    spoil: Callable[[Rows], None],
-    sigma: str,
-    clean: Rows,
-    folder: Path,
-    capsys: pytest.CaptureFixture[str],
-) -> list[dict[str, Any]]:
-    rows = [dict(row) for row in clean]
-    spoil(rows)
-    with (folder / "r.csv").open("w", encoding="utf-8", newline="") as stream:
-        writer = csv.DictWriter(stream, list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
-    assert main(["fit", QUICKSTART, str(folder / "r.csv"), "--sigma", sigma, "--json"]) == 0
-    found: list[dict[str, Any]] = json.loads(capsys.readouterr().out)["diagnosis"]["contradicted"]
-    return found

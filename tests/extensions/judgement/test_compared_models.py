@@ -64,16 +64,7 @@ def simulated(experiment: Experiment, seed: int = 1) -> ObservedReadings:
 
 def dense_sum(observed: ObservedReadings, position: int, rotation: int) -> tuple[float, int]:
     """S^2 and the number of parameters of a dense fit."""
-    design, functions = observed.design, dense.error_functions(position, rotation)
-    problem = dense.Problem(
-        design,
-        functions,
-        observed.x,
-        design.positions.rotations,
-        design.positions.origins,
-        design.balls.places,
-        np.zeros(sum(one.free for one in functions)),
-    )
+    problem = replace(dense.planned(observed.design, position, rotation), scales=observed.x)
     for _ in range(3):
         step, _ = dense.least_squares_step(problem)
         balls, rotations, origins, a = dense.unpack(problem, step)

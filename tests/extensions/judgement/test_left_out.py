@@ -79,16 +79,7 @@ def test_prediction_errors_and_their_variances_are_those_of_dense_algebra(positi
     design = lay_out(small())
     observed = campaign(design, 2)
     x, design = observed.x, observed.design
-    functions = dense.error_functions(3, 2)
-    problem = dense.Problem(
-        design,
-        functions,
-        x,
-        design.positions.rotations,
-        design.positions.origins,
-        design.balls.places,
-        np.zeros(sum(one.free for one in functions)),
-    )
+    problem = replace(dense.planned(design, 3, 2), scales=x)
     zero = np.zeros(problem.parameters)
     whole = dense.jacobian(lambda step: dense.residuals(problem, step), problem.parameters)
     now = dense.residuals(problem, zero)
