@@ -11,11 +11,7 @@ import pytest
 from ballplate.extensions.diagnosis.bias_patterns import Patterns, patterns
 from ballplate.extensions.diagnosis.cause_search import searched
 from ballplate.extensions.diagnosis.hat import hat_rows, row_count
-from ballplate.extensions.diagnosis.power import (
-    alarm_limit,
-    chance_of_alarm,
-    noncentrality,
-)
+from ballplate.extensions.diagnosis.power import alarm_limit, chance_of_alarm, noncentrality
 from ballplate.extensions.diagnosis.redundancy import reliability_of
 from ballplate.extensions.diagnosis.reliability_result import Reliability
 from ballplate.extensions.diagnosis.remainders import Columns, leftover

@@ -12,11 +12,7 @@ import ballplate as bp
 import numpy as np
 import pytest
 import scipy.stats
-from ballplate.extensions.judgement.compared_models import (
-    compared_models,
-    first_adequate,
-    fit_rung,
-)
+from ballplate.extensions.judgement.compared_models import compared_models, first_adequate, fit_rung
 from ballplate.extensions.judgement.lack_of_fit import pure_error
 from ballplate.extensions.judgement.rungs import (
     determined_rungs,

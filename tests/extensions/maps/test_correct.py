@@ -270,10 +270,7 @@ def test_fits_and_files_that_name_readings_are_taken_as_their_maps_are(
     expected = bp.correct(fitted, points)
     assert np.array_equal(bp.correct(fit, points).points, expected.points)  # type: ignore[arg-type]
     assert np.array_equal(bp.correct(fit, points).covariance(), expected.covariance())  # type: ignore[arg-type]
-    for call in (
-        lambda one: bp.curves(one, points=3),
-        lambda one: bp.map(one, grid=(2, 2, 2)),
-    ):
+    for call in (lambda one: bp.curves(one, points=3), lambda one: bp.map(one, grid=(2, 2, 2))):
         assert call(fit).to_dict() == call(fitted).to_dict()
     with pytest.raises(TypeError, match=wording.GIVE_A_FIT_WHAT):
         bp.correct(3, points)  # type: ignore[arg-type]

@@ -136,10 +136,7 @@ def test_json_has_full_precision(capsys: pytest.CaptureFixture[str]) -> None:
     assert found["arrangement"] == "MB1" and found["coverage_factor"] == 1.0
     assert run("map", ARM, "--curves", "--json") == 0
     phi1 = json.loads(capsys.readouterr().out)["numbers"][0]
-    assert (phi1["value"], phi1["meaning"]) == (
-        pytest.approx(7.2e-6),
-        wording.TILT_OF_THE_COLUMN,
-    )
+    assert (phi1["value"], phi1["meaning"]) == (pytest.approx(7.2e-6), wording.TILT_OF_THE_COLUMN)
 
 
 def test_a_line_between_two_points(capsys: pytest.CaptureFixture[str]) -> None:

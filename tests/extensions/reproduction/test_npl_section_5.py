@@ -59,9 +59,7 @@ QUICK = ("5.2", "5.3[empirical fit]", "5.4[kinematic machine, kinematic fit]")
     "published",
     [
         pytest.param(
-            one,
-            id=one.design,
-            marks=[] if one.design.startswith(QUICK) else [pytest.mark.long],
+            one, id=one.design, marks=[] if one.design.startswith(QUICK) else [pytest.mark.long]
         )
         for one in npl().convergence
     ],
