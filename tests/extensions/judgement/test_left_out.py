@@ -196,13 +196,16 @@ def test_a_shifted_reading_is_found_where_it_is() -> None:
     np.testing.assert_allclose(one.worst.error, 5e-6, atol=1.5e-6)
 
 
-def test_what_the_others_do_not_predict_is_not_tested() -> None:
-    """The others tell nothing of one position of a deficient design, and no length is known."""
-    (experiment,) = bp.load_all("designs/certified/deficient.yaml")
-    found = bp.validate(experiment, bp.simulate(experiment, seed=1))
-    told = {one["name"]: one for one in found.to_dict()["left_out"]}
-    assert told["x middle"]["predicted"] == 0 and told["x middle"]["chance"] == 1.0
-    assert all(one["largest_length_difference"] is None for one in told.values())
-    assert found.headline().startswith("3 left out") and "of 3 p-values" in found.lines()[-1]
-    shown = {line[:8]: line.split()[2:] for line in found.lines()[4:-1]}
-    assert shown["x middle"] == ["0", "-", "-", "-"] and shown["z low   "][-1] == "-"
+def test_what_is_unknown_without_a_position_has_no_number() -> None:
+    """One of two positions leaves the scale of an axis open, and a single one has no others."""
+    found, alone = (
+        bp.validate(experiment, bp.simulate(experiment, seed=1))
+        for name in ("two-dimensions", "bryan-gauge")
+        for experiment in bp.load_all(f"designs/certified/{name}.yaml")
+    )
+    told = found.to_dict()["left_out"]
+    assert [one["largest_length_difference"] for one in told] == [None, None]
+    assert found.headline() == "2 left out in turn, 0 predicted wrongly" and not found.complaint
+    assert [line.split()[1] + line.split()[-1] for line in found.lines()[4:6]] == ["11-", "11-"]
+    assert alone.to_dict()["left_out"] == [] and "no test is possible" in alone.complaint
+    assert alone.lines()[-1] == alone.headline() == "no position is predicted by the others"

@@ -17,7 +17,6 @@ from ballplate.cli import main
 from ballplate.presentation import number
 from ballplate.results.fits import Fit
 from ballplate.simulator.estimation import Distances, MeasuredPoints, linear_functions
-from scipy.stats import f, t
 
 from tests.extensions.maps import wording
 from tests.reference.small_quickstart import small_quickstart
@@ -109,12 +108,6 @@ def test_differences_are_those_of_what_the_fits_correct(fits: list[Fit]) -> None
         known = [one for one in mine if one["E_n"] is not None]
         assert (group["count"], group["undetermined"]) == (len(known), 0)
         assert group["exceeding"] == sum(abs(one["E_n"]) > 1.0 for one in known)
-        assert group["share_by_chance"] == pytest.approx(2.0 * t.sf(2.0, 386), rel=1e-2)
-    for test in told["tests"]:
-        freedom, count = test["degrees_of_freedom"], test["dimensions"]
-        # Of two sigmas from as many degrees of freedom, their sum is nearly one from all.
-        about = f.sf(test["chi_squared"] / count, count, freedom)
-        assert test["p"] == pytest.approx(about, rel=1e-2) and freedom == pytest.approx(386, 5e-3)
 
 
 def test_text_says_what_the_data_say(maps: list[str], capsys: pytest.CaptureFixture[str]) -> None:
