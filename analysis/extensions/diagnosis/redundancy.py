@@ -31,6 +31,9 @@ from .response import responses
 
 FALSE_ALARM, POWER = 0.001, 0.8
 
+# Redundancy numbers that rounding leaves of none.
+ROUNDING = 1e-10
+
 # Instead of a symbol: distances between points measured with any of the tasks' probes.
 ACROSS = "across probes"
 
@@ -106,7 +109,8 @@ def reliability_of(
     for response in responses(linearisation, biases):
         report(ProgressStep("observations", finished, row_count(design)))
         finished += len(response.rows)
-        redundancy[response.rows] = 1.0 - response.hat
+        left = 1.0 - response.hat
+        redundancy[response.rows] = np.where(left > ROUNDING, left, 0.0)
         information[response.index] = response.information
         remaining_share[response.index] = response.information / np.where(
             response.square > 0.0, response.square, 1.0

@@ -140,7 +140,7 @@ def _names(design: Design, observations: Observations, experiment: Experiment) -
 def _kinds_of_rows(design: Design, observations: Observations) -> list[str]:
     """Return the group of each row of observations, by class and artefact."""
     count = observations.count(design)
-    if isinstance(observations, Lengths) or not observations.balls.shape[1]:
+    if not observations.balls.shape[1]:
         return [f"{observations.word}s"] * count
     artefacts = design.balls.artefact[observations.balls[:, 0]].tolist()
     return [f"{observations.word}s of {design.artefacts.names[k]}" for k in artefacts]

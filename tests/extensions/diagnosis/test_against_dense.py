@@ -14,7 +14,7 @@ from ballplate.extensions.diagnosis.bias_patterns import Patterns, patterns
 from ballplate.extensions.diagnosis.hat import row_places, whitened_residuals
 from ballplate.extensions.diagnosis.redundancy import reliability_of
 from ballplate.extensions.diagnosis.reliability_result import Reliability
-from ballplate.simulator.design.arrays import Design, State, nominal_state
+from ballplate.simulator.design.arrays import Design, Readings, State, nominal_state
 from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.design.observations.lengths import Lengths
@@ -205,51 +205,50 @@ def test_repeats_and_lengths_that_share_a_certificate() -> None:
 
 
 def changed(design: Design, given: Patterns, k: int, size: float) -> tuple[Design, Real]:
-    """The design and its readings with a bias put in where it belongs, as an observer would see
-    it.
+    """The design and its error-free readings with a bias put in."""
+    x = expected_readings(design, nominal_state(design), design.readings)
+    return biased(design, x, design.readings, given, k, size)
+
+
+def biased(
+    design: Design, x: Real, readings: Readings, given: Patterns, k: int, size: float
+) -> tuple[Design, Real]:
+    """The design and readings, each repeat one of its own or not, with a bias of a planned pattern
+    put in where it belongs, as an observer would see it.
     """
-    state, kind, subject, axis = (
-        nominal_state(design),
-        given.kind[k],
-        int(given.subject[k]),
-        int(given.axis[k]),
-    )
-    x = expected_readings(design, state, design.readings).copy()
-    readings, step = (
-        design.readings,
-        size * np.eye(design.dimension)[max(axis, 0) % design.dimension],
-    )
+    kind, subject, axis = given.kind[k], int(given.subject[k]), int(given.axis[k])
+    planned, x = given.design.readings, x.copy()
+    step = size * np.eye(design.dimension)[max(axis, 0) % design.dimension]
+    times = planned.repeats if len(readings) > len(planned) else 1
+    number = np.repeat(np.arange(len(planned)), times)
     here = readings.position == subject
+    places = x + design.probes.offsets[readings.probe]
+    away = places - places[here].mean(axis=0) if here.any() else places
     if kind == "reading":
-        x[subject] += step
+        x[number == subject] += step
+    elif kind == "length":
+        x[number == design.of(Lengths).first[subject]] += (
+            size * design.of(Lengths).direction[subject]
+        )
     elif kind == "ball":
-        x[
-            (readings.ball == readings.ball[subject])
-            & (readings.position == readings.position[subject])
-        ] += step
+        same = readings.ball == planned.ball[subject]
+        x[same & (readings.position == planned.position[subject])] += step
     elif kind == "moved":
         # Positions are read one after the other in these designs.
-        later = (readings.ball == readings.ball[subject]) & (
-            readings.position >= readings.position[subject]
-        )
+        later = readings.position >= planned.position[subject]
+        later &= readings.ball == planned.ball[subject]
         balls = design.balls.places.copy()
-        balls[readings.ball[subject]] += step
-        displaced = expected_readings(design, replace(state, balls=balls), readings)
-        x[later] = displaced[later]
+        balls[planned.ball[subject]] += step
+        displaced = replace(nominal_state(design), balls=balls)
+        x[later] = expected_readings(design, displaced, readings)[later]
     elif kind == "shift":
-        x[here & (np.arange(len(x)) >= given.start[k])] += step
+        x[here & (number >= given.start[k])] += step
     elif kind == "turn":
         vector = size * (np.eye(3)[axis] if design.dimension == 3 else np.ones(1))
-        rows = np.flatnonzero(here)
-        places = x[rows] + design.probes.offsets[readings.probe[rows]]
-        centre = places.mean(axis=0)
-        turned = centre + (places - centre) @ rotation_from_vector(vector[None])[0].T
-        late = rows >= given.start[k]
-        x[rows[late]] += (turned - places)[late]
+        late = here & (number >= given.start[k])
+        x[late] += (away @ rotation_from_vector(vector[None])[0].T - away)[late]
     elif kind == "expansion":
-        rows = np.flatnonzero(here)
-        places = x[rows] + state.probes[readings.probe[rows]]
-        x[rows] += size * (places - places.mean(axis=0))
+        x[here] += size * away[here]
     elif kind in ("drift", "scale drift"):
         # From the first reading to the last, all taking as long, repeats as often as there are.
         done = np.cumsum(readings.repeats)
@@ -260,28 +259,21 @@ def changed(design: Design, given: Patterns, k: int, size: float) -> tuple[Desig
         probes = design.probes.offsets.copy()
         probes[subject] += step
         return altered(design, probes={"offsets": probes}), x
-    elif kind in ("distance", "coordinate", "prior"):
-        (items,) = (one for one in design.observations if one.word == kind)
-        value = items.value.copy()
-        value[subject] += size
-        return design.observed(items.given(value=value)), x
     elif kind == "length value":
-        same = design.of(Lengths).certificate == design.of(Lengths).certificate[subject]
-        return (
-            design.observed(
-                replace(design.of(Lengths), value=design.of(Lengths).value + size * same)
-            ),
-            x,
-        )
+        lengths = design.of(Lengths)
+        same = lengths.certificate == lengths.certificate[subject]
+        return design.observed(replace(lengths, value=lengths.value + size * same)), x
     elif kind == "scale":
-        of_plate = design.artefacts.names[subject] == "plate"
-        assert of_plate
+        assert design.artefacts.names[subject] == "plate"
         larger = [
             one.given(value=one.value * (1.0 + size)) for one in design.observations if one.scales
         ]
         return design.observed(*larger), x
     else:
-        raise AssertionError(kind)
+        (items,) = (one for one in design.observations if one.word == kind)
+        value = items.value.copy()
+        value[subject] += size
+        return design.observed(items.given(value=value)), x
     return design, x
 
 

@@ -59,10 +59,7 @@ def suspected(fit: bp.Fit) -> list[dict[str, Any]]:
     ],
 )
 def test_an_exact_value_that_is_wrong_is_named_as_one_that_is_let_go_shows_it(
-    tmp_path: Path,
-    right: dict[tuple[str, str], float],
-    pair: tuple[str, str],
-    wrong: float,
+    tmp_path: Path, right: dict[tuple[str, str], float], pair: tuple[str, str], wrong: float
 ) -> None:
     readings = bp.simulate(experiment(tmp_path, stated(right)))
     fit = bp.fit(experiment(tmp_path, stated({**right, pair: wrong})), readings)

@@ -4,7 +4,6 @@ fits.
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,19 +11,11 @@ import pytest
 from ballplate.extensions.diagnosis.bias_patterns import Patterns, patterns
 from ballplate.extensions.diagnosis.cause_search import searched
 from ballplate.extensions.diagnosis.hat import hat_rows, row_count
-from ballplate.extensions.diagnosis.power import (
-    alarm_limit,
-    chance_of_alarm,
-    noncentrality,
-)
+from ballplate.extensions.diagnosis.power import alarm_limit, chance_of_alarm, noncentrality
 from ballplate.extensions.diagnosis.redundancy import reliability_of
 from ballplate.extensions.diagnosis.reliability_result import Reliability
 from ballplate.extensions.diagnosis.remainders import Columns, leftover
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
-from ballplate.simulator.design.observations.distances import CalibratedDistances
-from ballplate.simulator.design.observations.lengths import Lengths
-from ballplate.simulator.design.observations.readings import rotation_sensitivity
 from ballplate.simulator.estimation.gauss_newton import Solution, estimate, linearised_fit
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
@@ -36,6 +27,7 @@ from scipy.special import nctdtr
 from scipy.stats import binom
 
 from tests.extensions.diagnosis.designs import MIXED, PLANE, PLATE, experiment
+from tests.extensions.diagnosis.test_against_dense import biased
 
 Real = NDArray[np.float64]
 FALSE_ALARM, POWER = 0.001, 0.8
@@ -138,69 +130,6 @@ def test_rates_of_the_linear_model(text: str, tmp_path: Path) -> None:
                 assert within_chance(hits, draws, POWER), (kind, k, estimated, hits / draws)
 
 
-def biased(
-    design: Design, x: Real, readings, given: Reliability, k: int, size: float
-) -> tuple[Design, Real]:  # type: ignore[no-untyped-def]
-    """Readings, one for each repeat, and certificates with a bias of the planned pattern `k` put
-    in.
-    """
-    patterns = given.patterns
-    kind, subject, axis = patterns.kind[k], int(patterns.subject[k]), int(patterns.axis[k])
-    planned, x = given.design.readings, x.copy()
-    step = size * np.eye(design.dimension)[max(axis, 0) % design.dimension]
-    number = np.repeat(np.arange(len(planned)), planned.repeats)
-    here = readings.position == subject
-    places = x + design.probes.offsets[readings.probe]
-    if kind == "reading":
-        x[number == subject] += step
-    elif kind == "ball":
-        x[
-            (readings.ball == planned.ball[subject])
-            & (readings.position == planned.position[subject])
-        ] += step
-    elif kind == "shift":
-        x[here & (number >= patterns.start[k])] += step
-    elif kind == "turn":
-        late = here & (number >= patterns.start[k])
-        away = places - places[here].mean(axis=0)
-        x[late] += (
-            size * rotation_sensitivity(away[late])[:, :, axis if design.dimension == 3 else 0]
-        )
-    elif kind == "probe":
-        # The machine reads with a tip that is not where it is said to be.
-        x[readings.probe == subject] += step
-    elif kind == "expansion":
-        x[here] += size * (places - places[here].mean(axis=0))[here]
-    elif kind == "length":
-        x[number == design.of(Lengths).first[subject]] += (
-            size * design.of(Lengths).direction[subject]
-        )
-    elif kind == "length value":
-        same = design.of(Lengths).certificate == design.of(Lengths).certificate[subject]
-        return (
-            design.observed(
-                replace(design.of(Lengths), value=design.of(Lengths).value + size * same)
-            ),
-            x,
-        )
-    elif kind == "scale":
-        value = design.of(CalibratedDistances).value * (1.0 + size)
-        known = design.of(CalibratedCoordinates)
-        return (
-            design.observed(
-                replace(design.of(CalibratedDistances), value=value),
-                replace(known, value=known.value * (1.0 + size)),
-            ),
-            x,
-        )
-    else:
-        (items,) = (one for one in design.observations if one.word == kind)
-        value = items.value.copy()
-        value[subject] += size
-        return design.observed(items.given(value=value)), x
-    return design, x
-
-
 class Fits:
     """Real fits of simulated readings."""
 
@@ -219,7 +148,7 @@ class Fits:
         drawn = noisy_certificate(self.design, self.truth, generator)
         readings, x = noisy_readings(self.on_truth, self.truth, generator)
         if planned is not None:
-            drawn, x = biased(drawn, x, readings, planned, k, size)
+            drawn, x = biased(drawn, x, readings, planned.patterns, k, size)
         observed = observe(drawn, readings, x)
         solution = estimate(observed.design, observed.x)
         assert solution.status == "converged"

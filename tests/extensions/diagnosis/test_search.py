@@ -12,12 +12,7 @@ import pytest
 from ballplate.extensions.diagnosis.cause_search import FoundCause, Search
 from ballplate.extensions.diagnosis.hat import whitened_residuals
 from ballplate.extensions.diagnosis.remainders import leftover
-from ballplate.extensions.diagnosis.scatter import (
-    log_chances,
-    ratio,
-    scatters,
-    with_scatter,
-)
+from ballplate.extensions.diagnosis.scatter import log_chances, ratio, scatters, with_scatter
 from ballplate.simulator.design.arrays import Design, State
 from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.gauss_newton import estimate, moved
@@ -88,10 +83,7 @@ def test_what_causes_explain_is_what_they_take_away_as_parameters(
     design, state, x = fitted(text, tmp_path)
     search = Search(linearise(design, state, x), x, True)
     matrix = search.patterns.matrix.toarray()
-    residual, taken = (
-        whitened_residuals(design, state, x),
-        jacobian(design, state, x),
-    )
+    residual, taken = (whitened_residuals(design, state, x), jacobian(design, state, x))
     assert search.left.sum_of_squares == pytest.approx(left_by(taken, residual), rel=1e-7)
     generator, widths = np.random.default_rng(1), set()
     for step in range(2):
@@ -120,10 +112,7 @@ def test_what_causes_explain_is_what_they_take_away_as_parameters(
 def test_smooth_errors_explain_what_they_take_away_as_parameters(tmp_path: Path) -> None:
     design, state, x = fitted(PLANE, tmp_path)
     search = Search(linearise(design, state, x), x, True)
-    residual, taken = (
-        whitened_residuals(design, state, x),
-        jacobian(design, state, x),
-    )
+    residual, taken = (whitened_residuals(design, state, x), jacobian(design, state, x))
     before, seen = left_by(taken, residual), set()
     # An error in one axis along another has one value for each place on the latter's scale.
     for axis, component in ((0, 0), (0, 1), (1, 0), (1, 1)):

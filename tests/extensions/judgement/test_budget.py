@@ -4,7 +4,9 @@ fits with one stated value changed at a time.
 
 from __future__ import annotations
 
+import csv
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +16,7 @@ import pytest
 import yaml
 from ballplate.cli import main
 from ballplate.extensions.certificates.certificate_files import certified_values, with_values
-from ballplate.extensions.judgement.budget import UncertaintyBudget
+from ballplate.extensions.judgement.budget import BudgetFigure, UncertaintyBudget
 from ballplate.extensions.judgement.source_sums import source_sums, sources_of
 from ballplate.simulator.estimation.corrections import corrected_points
 from ballplate.simulator.estimation.gauss_newton import estimate
@@ -52,8 +54,8 @@ def shares(found: UncertaintyBudget, name: str, k: int = 0) -> dict[str, float]:
 
 
 def test_contributions_are_those_of_a_dense_computation() -> None:
-    """Readings by position, two items of calibration of the same kind, coordinates, and a bar whose
-    readings and certificate share the rows: every figure is the root of the sum of squares of its
+    """Readings by position, two items of calibration of the same kind, coordinates, and two bars whose
+    readings and certificates share the rows: every figure is the root of the sum of squares of its
     derivatives by the source's own errors.
     """
     told = yaml.safe_load((TOP / "designs" / "quickstart.yaml").read_text(encoding="utf-8"))
@@ -66,19 +68,21 @@ def test_contributions_are_those_of_a_dense_computation() -> None:
         )
     ]
     placed = [
-        {"name": f"bar {k}", "artefact": "bar", "pose": pose, "probes": ["down"]}
+        {"name": f"bar {k}", "artefact": ("bar", "bar", "rod")[k], "pose": pose, "probes": ["down"]}
         for k, pose in enumerate(poses)
     ]
     experiment = small(
         artefacts={
             "plate": {"kind": "grid", "balls": [3, 3], "size": ["750 mm", "750 mm"]},
             "bar": {"kind": "two_spheres", "length": "600 mm", "role": "length_standard"},
+            "rod": {"kind": "two_spheres", "length": "500 mm", "role": "length_standard"},
         },
         positions=[one | {"artefact": "plate"} for one in told["positions"]] + placed,
         calibration=[
             sides("0.2 um") | {"artefact": "plate"},
             sides("0.7 um", [["r1c1", "r3c3"], ["r1c2", "r3c2"]]) | {"artefact": "plate"},
             sides("0.3 um", "all") | {"artefact": "bar"},
+            sides("0.5 um", "all") | {"artefact": "rod"},
             {
                 "kind": "coordinates",
                 "artefact": "plate",
@@ -97,9 +101,9 @@ def test_contributions_are_those_of_a_dense_computation() -> None:
     ends = np.cumsum([3 * len(readings), 4 + 2, 6]).tolist()
     raw = inverse[:, ends[2] :] @ problem.length_root
     given = dense.known(design, "length")
-    assert len(given.certificate) == 3 and len(set(given.certificate.tolist())) == 1
-    certificate = raw @ given.uncertainty
-    noise = dense.length_covariance(design) - np.outer(given.uncertainty, given.uncertainty)
+    assert given.certificate.tolist() == [0, 0, 1]
+    certificates = given.uncertainty * np.array([[1.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    noise = dense.length_covariance(design) - certificates.T @ certificates
     functions = dense.quantities(problem)
     for symbol in ("U4", "U6"):
         linear = dense.jacobian(functions[symbol], problem.parameters)
@@ -113,11 +117,12 @@ def test_contributions_are_those_of_a_dense_computation() -> None:
         expected |= {
             "calibration[0]: distances of plate": by_row[:, ends[0] : ends[0] + 4].sum(1),
             "calibration[1]: distances of plate": by_row[:, ends[0] + 4 : ends[1]].sum(1),
-            "calibration[3]: coordinates of plate": by_row[:, ends[1] : ends[2]].sum(1),
+            "calibration[4]: coordinates of plate": by_row[:, ends[1] : ends[2]].sum(1),
             "readings of length standards": np.einsum(
                 "ma,ab,mb->m", linear @ raw, noise, linear @ raw
             ),
-            "certificate of bar": (linear @ certificate) ** 2,
+            "certificate of bar": (linear @ raw @ certificates[0]) ** 2,
+            "certificate of rod": (linear @ raw @ certificates[1]) ** 2,
         }
         own = shares(found, symbol)
         assert set(own) == set(expected)
@@ -171,7 +176,7 @@ def test_contributions_are_those_of_fits_with_other_values() -> None:
         # The fits stop a few picometres from where they go.
         assert found[source] == pytest.approx(np.sqrt(square), rel=1e-4, abs=1e-12), source
     u = fit.tasks[0].standard_uncertainty
-    assert found["readings"] ** 2 + sum(squares.values()) == pytest.approx(u**2, rel=1e-4)
+    assert found["readings"] ** 2 + sum(squares.values()) == pytest.approx(u**2, rel=1e-4, abs=0.0)
 
 
 def test_influence_quantities_are_sources() -> None:
@@ -212,22 +217,6 @@ def test_sources_add_up_in_every_design() -> None:
             assert all(np.linalg.eigvalsh(one).min() > -1e-10 for one in found.sums)
 
 
-def test_what_is_undetermined_is_said(capsys: pytest.CaptureFixture[str]) -> None:
-    file = str(TOP / "designs/certified/deficient.yaml")
-    found = bp.budget(file)
-    whole = bp.run(file).quantities
-    for one in found.figures[:2]:
-        assert (one.count, one.undetermined) == (
-            whole[one.name].count,
-            whole[one.name].undetermined,
-        )
-    assert main(["run", "--budget", file]) == 0
-    line = next(
-        line for line in capsys.readouterr().out.splitlines() if line.startswith("together")
-    )
-    assert line.split()[-5] == "undetermined" and np.isnan(found.figures[1].standard_uncertainty)
-
-
 def test_a_fit_multiplies_by_its_sigma_and_says_of_few_degrees_of_freedom() -> None:
     experiment = small(sigma="estimated")
     readings = bp.simulate(experiment, seed=4)
@@ -235,6 +224,7 @@ def test_a_fit_multiplies_by_its_sigma_and_says_of_few_degrees_of_freedom() -> N
     found = bp.budget(fit, by="axis")
     given = bp.budget(bp.fit(experiment, readings, sigma="given"), by="axis")
     assert found.sigma == fit.sigma != 1.0 and found.notes == ()
+    assert found.to_dict()["of"] == "fit" and "budget of the fit;" in found.lines()[1]
     for one, other in zip(found.figures, given.figures, strict=True):
         assert one.contributions == pytest.approx(fit.sigma * np.array(other.contributions))
     assert found.to_dict()["figures"][0]["expanded_uncertainty"] == pytest.approx(
@@ -268,17 +258,81 @@ def test_a_certificate_counts_whatever_is_said_of_the_table(
     assert told["with"]["sigma"] > 100.0 * told["without"]["sigma"]
 
 
-def test_sources_stand_in_the_order_of_what_they_contribute() -> None:
-    for name, by in (
+@pytest.mark.parametrize(
+    ("name", "by"),
+    [
         ("quickstart", "position"),
         ("certified/three-planes", "probe"),
-        ("quickstart", "axis"),
-    ):
-        path = TOP / "designs" / f"{name}.yaml"
-        found = bp.budget(bp.load(path), by=by)
-        figure = next(one for one in found.figures if one.name == "U6")
-        parts = np.array(figure.contributions)
-        assert (np.diff(parts) <= 1e-6 * parts.max()).all() and len(parts) > 2
-        assert found.lines()[1].endswith(wording.SOURCES_BY_THEIR_PART)
-        shown = [line.split("  ")[0].strip() for line in found.lines()[4 : 4 + len(parts)]]
-        assert shown == list(found.sources)
+        ("certified/deficient", "axis"),
+    ],
+)
+def test_text_and_table_say_what_the_data_say(name: str, by: Any) -> None:
+    """Sources in the order of what they contribute, and their squares add up."""
+    file = TOP / "designs" / f"{name}.yaml"
+    found, whole = bp.budget(file, by=by), bp.run(file).quantities
+    lines, told, rows = found.lines(), found.to_dict()["figures"], []
+    names = [figure["figure"] for figure in told]
+    ranking = "U4" if name.endswith("deficient") else "U6"
+    assert names == ["U4", "U6", *(f"diagonal {k}" for k in (1, 2, 3, 4))] and len(lines) < 25
+    assert lines[1] == (
+        "uncertainty budget of the design, at zero machine error;"
+        f" {wording.SOURCES_BY_THEIR_PART.replace('U6', ranking)}"
+    )
+    assert lines[5 + len(found.sources)].startswith("expanded, k = 2  ")
+    shown = [line.split("  ")[0].strip() for line in lines[4 : 4 + len(found.sources)]]
+    assert shown == list(found.sources) and len(shown) > 2
+    parts = [one.contributions for one in found.figures if one.name == ranking][0]
+    assert (np.diff(parts) <= 1e-6 * max(parts)).all()
+    for k, figure in enumerate(told):
+        u, column = figure["standard_uncertainty"], []
+        for line in lines[4 : 6 + len(shown)]:
+            column.append(re.split("  +", line)[1 + k])
+        assert (u is None) == (figure["count"] == figure["undetermined"])
+        counts = whole.get(figure["figure"], BudgetFigure("", "", 0.0, (), 1, 0))
+        assert (figure["count"], figure["undetermined"]) == (counts.count, counts.undetermined)
+        if u is None:
+            assert set(column) == {"undetermined"}
+            continue
+        squares = [one["standard_uncertainty"] ** 2 for one in figure["contributions"]]
+        assert (
+            sum(squares) == pytest.approx(u**2, rel=1e-9, abs=0.0)
+            and figure["expanded_uncertainty"] == 2.0 * u
+        )
+        assert list(map(float, column[-2:])) == pytest.approx([1e6 * u, 2e6 * u], rel=5e-4)
+        for one, cell, square in zip(figure["contributions"], column, squares, strict=False):
+            assert one["share_of_variance"] == pytest.approx(square / u**2)
+            value, share = re.fullmatch(r"(\S+) \((\S+) %\)", cell).groups()  # type: ignore[union-attr]
+            assert float(value) == pytest.approx(1e6 * square**0.5, rel=5.1e-3)
+            off = abs(float(share) - 100.0 * square / u**2)
+            assert off <= (0.5 if float(share) >= 1.0 else 0.5 * float(share))
+            rows.append((figure["figure"], one["source"], square**0.5, square / u**2))
+        left_out = f"; {figure['undetermined']} of {figure['count']} are undetermined and left out"
+        (line,) = (line for line in lines if line.startswith(f"{figure['figure']}: "))
+        assert line.endswith(left_out) == (figure["undetermined"] > 0)
+    table = [
+        list(row.values())
+        for row in csv.DictReader(found.to_csv().splitlines())
+        if row["share of variance"]
+    ]
+    assert [(*row[:2], *map(float, row[2:4])) for row in table] == [
+        (*row[:2], *map(pytest.approx, row[2:])) for row in rows
+    ]
+
+
+def test_diagonals_are_those_of_the_volume() -> None:
+    """They have the uncertainties of measuring tasks between the same places."""
+    ends = [((0, 0, 0), (1, 1, 1)), ((1, 0, 0), (0, 1, 1)), ((0, 1, 0), (1, 0, 1))]
+    ends += [((0, 0, 1), (1, 1, 0))]
+    tasks = [
+        {"name": f"{k}", "from": [f"{x} m" for x in start], "to": [f"{x} m" for x in end]}
+        for k, (start, end) in enumerate(ends)
+    ]
+    told = small_sections()
+    told["evaluation"] |= {"probe": "right", "tasks": tasks}
+    found = bp.budget(bp.experiment(told))
+    u = {one.name: (one.standard_uncertainty, one.contributions) for one in found.figures}
+    for k, pair in enumerate(ends):
+        assert u[f"diagonal {k + 1}"] == (pytest.approx(u[f"{k}"][0]), pytest.approx(u[f"{k}"][1]))
+        (one,) = (one for one in found.figures if one.name == f"diagonal {k + 1}")
+        words = ("(" + ", ".join(f"{1000 * x}" for x in end) + ")" for end in pair)
+        assert one.description.endswith("from {} to {} mm".format(*words))

@@ -4,17 +4,15 @@ forms, their choice against simulated machines whose coefficients are known.
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from typing import Any
 
 import ballplate as bp
 import numpy as np
 import pytest
 import scipy.stats
-from ballplate.extensions.judgement.compared_models import (
-    compared_models,
-    first_adequate,
-    fit_rung,
-)
+from ballplate.extensions.judgement.compared_models import compared_models, first_adequate, fit_rung
 from ballplate.extensions.judgement.lack_of_fit import pure_error
 from ballplate.extensions.judgement.rungs import (
     determined_rungs,
@@ -31,11 +29,13 @@ from ballplate.simulator.machines.protocol import Reported
 from ballplate.simulator.readings.observed_readings import ObservedReadings, observe
 from ballplate.simulator.readings.simulated import simulated_readings
 from numpy.typing import NDArray
+from scipy.spatial.distance import pdist
 
 from tests.extensions.judgement import wording
 from tests.extensions.judgement.model_campaigns import (
     KINDS,
     campaign,
+    laid_out,
     quickstart,
     readings_of,
     true_model,
@@ -60,16 +60,7 @@ def simulated(experiment: Experiment, seed: int = 1) -> ObservedReadings:
 
 def dense_sum(observed: ObservedReadings, position: int, rotation: int) -> tuple[float, int]:
     """S^2 and the number of parameters of a dense fit."""
-    design, functions = observed.design, dense.error_functions(position, rotation)
-    problem = dense.Problem(
-        design,
-        functions,
-        observed.x,
-        design.positions.rotations,
-        design.positions.origins,
-        design.balls.places,
-        np.zeros(sum(one.free for one in functions)),
-    )
+    problem = replace(dense.planned(observed.design, position, rotation), scales=observed.x)
     for _ in range(3):
         step, _ = dense.least_squares_step(problem)
         balls, rotations, origins, a = dense.unpack(problem, step)
@@ -175,6 +166,9 @@ def test_pure_error_is_the_scatter_of_repeats_about_their_means() -> None:
     ratio = (chosen.sum_of_squares - square) / beyond / (square / found.degrees_of_freedom)
     expected = scipy.stats.f.sf(ratio, beyond, found.degrees_of_freedom)
     np.testing.assert_allclose(result.lack_of_fit, expected, rtol=1e-3)
+    (line,) = (line for line in result.lines() if line.startswith("standard deviation of rep"))
+    assert f": {np.sqrt(square / found.degrees_of_freedom):.3g} times the stated one" in line
+    assert line.endswith(f"{chosen.model}: p-value {expected:.2g}")
 
 
 def test_what_the_design_cannot_determine_is_no_candidate() -> None:
@@ -199,6 +193,15 @@ def test_what_the_design_cannot_determine_is_no_candidate() -> None:
     assert first.count > most and (at.deficiency > 0 or left <= 0)
 
 
+def test_every_number_of_coefficients_is_tried() -> None:
+    models, beyond = determined_rungs(quickstart(), laid_out(), 5)
+    kinematic = [(2, 1), *((count, count) for count in (2, 3, 4, 5))]
+    assert not beyond and {(type(one.model).__name__, one.numbers) for one in models} == {
+        *(("KinematicModel", numbers) for numbers in kinematic),
+        *(("EmpiricalModel", (count, count)) for count in (3, 4, 5)),
+    }
+
+
 def test_models_contain_those_of_their_kind_with_fewer_coefficients() -> None:
     kinematic = [kinematic_rung(quickstart(), *numbers) for numbers in ((2, 1), (3, 2), (4, 1))]
     empirical = [empirical_rung(quickstart(), count) for count in (3, 4)]
@@ -214,22 +217,6 @@ def test_models_contain_those_of_their_kind_with_fewer_coefficients() -> None:
         (uneven, straight),
         ("empirical, 4 coefficients", "empirical, 3 coefficients"),
     }
-
-
-def test_changes_of_lengths_are_those_between_fits() -> None:
-    experiment = small()
-    readings = bp.simulate(experiment)
-    found = bp.compare_models(experiment, readings, coefficients=3)
-    chosen = experiment.with_({"error_model": found.error_model})
-    points = bp.fit(experiment, readings).design.evaluation.points
-    first, second = (bp.fit(one, readings).correct(points).points for one in (experiment, chosen))
-    i, j = np.triu_indices(len(points), 1)
-    change = np.linalg.norm(first[i] - first[j], axis=1) - np.linalg.norm(
-        second[i] - second[j], axis=1
-    )
-    file = next(one for one in found.rungs if one.is_of_file)
-    np.testing.assert_allclose(file.largest_change, np.abs(change).max(), atol=1e-12)
-    np.testing.assert_allclose(file.rms_change, np.sqrt((change**2).mean()), atol=1e-12)
 
 
 def test_readings_without_scatter_call_for_their_own_model() -> None:
@@ -289,24 +276,83 @@ def test_the_richest_model_of_one_position_is_recommended_with_a_warning() -> No
     assert all(one.undetermined >= 0 for one in rungs)
 
 
-def test_the_p_value_of_a_model_is_that_of_its_best_larger_one() -> None:
-    experiment = small()
-    found = compared_models(experiment, simulated(experiment, 8))
-    assert found.beaten.by in found.verdict()[0]
-    rows = {row["model"]: row for row in found.rows()}
-    compared = 0
-    for row in rows.values():
-        by = row["best_richer_model"]
-        assert (by is None) == (row["richer_models"] == 0)
-        if by in rows:
-            rich = rows[by]
-            more = row["degrees_of_freedom"] - rich["degrees_of_freedom"]
+def kinematic(position: int, rotation: int) -> dict[str, Any]:
+    numbers = {"position_coefficients": position, "rotation_coefficients": rotation}
+    return {"kind": "kinematic", **numbers}
+
+
+@pytest.mark.parametrize(
+    ("sigma", "model", "words"),
+    [
+        ("estimated", kinematic(2, 1), wording.IS_TOO_SMALL),
+        ("given", kinematic(5, 5), wording.HAS_MORE_PARAMETERS),
+        ("estimated", {"kind": "metric"}, wording.IS_NOT_NESTED),
+    ],
+)
+def test_text_and_data_say_what_the_fits_say(sigma: Any, model: Any, words: str) -> None:
+    """The p-value of a model is that of its best larger one."""
+    experiment, readings = small(error_model=model), bp.simulate(small(), 8)
+    found = bp.compare_models(experiment, readings, sigma, 5)
+    rows, compared = {row["model"]: row for row in found.rows()}, 0
+    (chosen,) = (row for row in rows.values() if row["recommended"])
+    (file,) = (row for row in rows.values() if row["of_the_file"])
+    for line, row in zip(found.lines()[4:], rows.values(), strict=False):
+        freedom, square, by = (
+            row[name] for name in ("degrees_of_freedom", "sum_of_squares", "best_richer_model")
+        )
+        assert (by is None) == (row["richer_models"] == 0) == (row["chance"] is None)
+        chances = {}
+        for name, rich in rows.items():
+            mine, its = (
+                re.findall(r"kinematic|empirical|\d+", one) for one in (row["model"], name)
+            )
+            is_larger = mine[:1] == its[:1] != [] and rich["parameters"] > row["parameters"]
+            if not is_larger or any(
+                int(m) > int(n) for m, n in zip(mine[1:], its[1:], strict=True)
+            ):
+                continue
+            more, gain = freedom - rich["degrees_of_freedom"], square - rich["sum_of_squares"]
             left = rich["sum_of_squares"] / rich["degrees_of_freedom"]
-            ratio = (row["sum_of_squares"] - rich["sum_of_squares"]) / more / left
-            least = scipy.stats.f.sf(ratio, more, rich["degrees_of_freedom"])
-            expected = min(1.0, row["richer_models"] * least)
+            chances[name] = scipy.stats.chi2.sf(gain, more)
+            if sigma == "estimated":
+                of_f = (gain / more / left, more, rich["degrees_of_freedom"])
+                chances[name] = scipy.stats.f.sf(*of_f)
+        assert len(chances) == row["richer_models"]
+        if chances:
+            best = min(chances.values())
+            expected = min(1.0, len(chances) * best)
             assert row["chance"] == pytest.approx(expected, rel=1e-3, abs=1e-12)
+            assert chances[by] == pytest.approx(best, rel=1e-3, abs=1e-12)
             compared += 1
-    assert compared > 0
-    counts = [one.parameters for one in found.rungs]
-    assert counts == sorted(counts) and len(counts) == len(set(one.model for one in found.rungs))
+        chance = row["chance"]
+        p = "-" if chance is None else "<1e-06" if chance < 1e-6 else f"{chance:.2g}"
+        least_bic = min(one["bic"] for one in rows.values())
+        shown = line.removeprefix(row["model"]).partition("<-")[0].split()
+        assert shown[:5] == [
+            *(str(row["parameters"]), str(freedom), f"{np.sqrt(square / freedom):.4g}"),
+            *(p, f"{row['bic'] - least_bic:.1f}"),
+        ]
+        changes = [1e6 * row[name] for name in ("largest_change", "rms_change")]
+        assert list(map(float, shown[5:])) == pytest.approx(changes, rel=5e-3)
+        marks = ["recommended"] * row["recommended"]
+        marks += ["the file's"] * (row["of_the_file"] and model["kind"] != "metric")
+        assert line.partition("<- ")[2] == ", ".join(marks)
+    assert compared > 3
+    counts = [row["parameters"] for row in rows.values()]
+    assert counts == sorted(counts) and found.beaten.by in found.verdict()[0]
+    words = words.format(by=file["best_richer_model"], apart=file["bic"] - chosen["bic"])
+    own = file["model"].removeprefix("the file's, ")
+    changed = float(found.verdict()[1].split()[-3])
+    assert found.verdict()[1].startswith(f"the file's error model, {own}, {words}")
+    assert changed == pytest.approx(1e6 * file["rms_change"], rel=5e-3)
+    # What it says of the recommended model's lengths is what a fit with it says.
+    with_chosen = experiment.with_({"error_model": found.error_model})
+    fits = [bp.fit(one, readings, sigma=sigma) for one in (experiment, with_chosen)]
+    points, u6 = fits[0].design.evaluation.points, fits[1].quantities["U6"]
+    change = np.subtract(*(pdist(fit.correct(points).points) for fit in fits))
+    changes = [np.abs(change).max(), np.sqrt((change**2).mean())]
+    assert [file["largest_change"], file["rms_change"]] == pytest.approx(changes, abs=1e-12)
+    (line,) = (line for line in found.lines() if line.startswith("for comparison"))
+    figures = [2e6 * u6.maximum, 2e6 * u6.average]
+    assert re.findall(r"([\d.]+) µm", line) == [f"{figure:#.3g}" for figure in figures]
+    assert found.to_dict()["lengths"]["maximum"] == pytest.approx(u6.maximum, rel=1e-5)

@@ -24,12 +24,7 @@ from scipy.stats import chi2
 
 from tests.extensions.maps import wording
 from tests.extensions.maps.campaigns import simulated_fit, simulated_map
-from tests.observations.test_joint_values import (
-    PAIRS,
-    covariance_file,
-    random_covariance,
-    written,
-)
+from tests.observations.test_joint_values import PAIRS, covariance_file, random_covariance, written
 from tests.reference.small_quickstart import small_quickstart
 
 

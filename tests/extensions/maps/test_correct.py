@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from pathlib import Path
 
 import ballplate as bp
@@ -111,7 +112,7 @@ def test_lengths_between_points_of_different_probes(fitted: FittedMap) -> None:
     scattered = bp.correct(fitted, x, probes, lengths=[(0, 1)], with_repeatability=True)
     added = 2.0 * (fitted.sigma * fitted.repeatability[0]) ** 2
     variance = scattered.lengths[0].standard_uncertainty ** 2
-    assert variance == pytest.approx(right[0] ** 2 + added, rel=1e-7)
+    assert variance == pytest.approx(right[0] ** 2 + added, rel=1e-7, abs=0.0)
     assert np.allclose(
         scattered.blocks - found.blocks, 0.5 * added * np.eye(3), rtol=1e-9, atol=1e-24
     )
@@ -195,6 +196,22 @@ def test_the_command_writes_what_python_gives(
         rows = list(csv.DictReader(stream))
     assert [row["outside"] for row in rows] == ["no", "no", "yes"]
     assert float(rows[1]["x_mm"]) == pytest.approx(1e3 * found.points[1, 0], rel=1e-14)
+    # The text has what the data have, with as many digits as the uncertainty has two.
+    for line, one in zip(found.lines()[-8:-5], data["points"], strict=True):
+        name, probe, *cells = re.split("  +", line)
+        u = np.array(one["standard_uncertainty"])
+        values = [*1e3 * np.array(one["point"]), *1e6 * np.array(one["correction"]), *2e6 * u]
+        off = np.abs(np.subtract(list(map(float, cells)), values))
+        assert (off <= 0.06 * np.tile(u, 3) * np.repeat([1e3, 1e6, 1e6], 3)).all()
+        assert (name, probe) == (one["name"], one["probe"])
+    assert "A to C" in found.lines()[-1]
+    for line in found.lines()[-3:]:
+        name, *cells = re.split("  +", line)
+        one = next(one for one in data["lengths"] if one["name"] == name)
+        u = one["standard_uncertainty"]
+        expected = [1e3 * one["value"], 1e6 * one["correction"], 2e6 * u, 2.0]
+        off = np.abs(np.subtract(list(map(float, cells)), expected))
+        assert (off <= 0.06 * u * np.array([1e3, 1e6, 1e6, 0.0])).all()
     written = read_matrix(tmp_path / "covariance.csv")
     assert np.allclose(written.values, found.covariance(), rtol=1e-12, atol=1e-24)
 
@@ -253,10 +270,7 @@ def test_fits_and_files_that_name_readings_are_taken_as_their_maps_are(
     expected = bp.correct(fitted, points)
     assert np.array_equal(bp.correct(fit, points).points, expected.points)  # type: ignore[arg-type]
     assert np.array_equal(bp.correct(fit, points).covariance(), expected.covariance())  # type: ignore[arg-type]
-    for call in (
-        lambda one: bp.curves(one, points=3),
-        lambda one: bp.map(one, grid=(2, 2, 2)),
-    ):
+    for call in (lambda one: bp.curves(one, points=3), lambda one: bp.map(one, grid=(2, 2, 2))):
         assert call(fit).to_dict() == call(fitted).to_dict()
     with pytest.raises(TypeError, match=wording.GIVE_A_FIT_WHAT):
         bp.correct(3, points)  # type: ignore[arg-type]

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +14,9 @@ import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.cli import main
+from ballplate.presentation import number
 from ballplate.results.fits import Fit
+from ballplate.simulator.estimation import Distances, MeasuredPoints, linear_functions
 
 from tests.extensions.maps import wording
 from tests.reference.small_quickstart import small_quickstart
@@ -43,17 +47,113 @@ def test_maps_of_files_are_compared(
     out = capsys.readouterr().out
     assert out.startswith("b less a: ") and wording.NO_CHANGE_IS_SHOWN in out
     assert wording.THE_CAMPAIGNS_ARE_TAKEN in out
+    assert picture.read_text("utf-8").count("<svg") == 1
     rows = list(csv.DictReader(table.read_text("utf-8").splitlines()))
-    diagonal = next(row for row in rows if row["kind"] == "body diagonals")
-    assert diagonal["figure"] == "(0, 0, 0) mm to (1000, 1000, 1000) mm"
-    ends = np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]])
-    lengths = [np.linalg.norm(np.diff(fit.correct(ends).points, axis=0)) for fit in fits]
-    assert float(diagonal["difference"]) == pytest.approx(lengths[1] - lengths[0], abs=1e-10)
-    years = (365 + 182) / 365.25
-    assert float(diagonal["per year"]) == pytest.approx(float(diagonal["difference"]) / years)
-    assert "µm per year" in out and picture.read_text("utf-8").count("<svg") == 1
+    data = printed(capsys, "diff", *maps)
+    assert [row["figure"] for row in rows] == [one["figure"] for one in data["figures"]]
+    for row, one in zip(rows, data["figures"], strict=True):
+        u, difference = one["standard uncertainty"], one["difference"]
+        assert one["E_n"] == pytest.approx(difference / (2.0 * u))
+        years = (365 + 182) / 365.25
+        assert float(row["per year"]) == pytest.approx(float(row["difference"]) / years)
     frame = bp.diff(*fits).to_frame()
     assert {"balls of plate", "EXX", "edges"} <= set(frame["kind"])
+
+
+def test_differences_are_those_of_what_the_fits_correct(fits: list[Fit]) -> None:
+    """Lengths, the motion of the frame by least squares, and what it leaves at the points."""
+    told = bp.diff(*fits, grid=3).to_dict()
+    points = np.stack(np.meshgrid(*[[0.0, 0.5, 1.0]] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    corrected = [fit.correct(points).points for fit in fits]
+    names = [f"({', '.join(f'{1000 * x:.0f}' for x in point)}) mm" for point in points]
+    pairs, at = list(combinations(range(27), 2)), fits[0].functions.at
+    distances = Distances(MeasuredPoints(points, np.zeros(27, int)), np.array(pairs), ("",) * 351)
+    u = np.hypot(
+        *(
+            fit.sigma * fit.functions.at.uncertainty(linear_functions(fit.functions.at, distances))
+            for fit in fits
+        )
+    )
+    assert at.design.probes.names[0] == told["probe"] == "down"
+    ends: dict[str, tuple[float, float]] = {}
+    for k, (i, j) in enumerate(pairs):
+        first, second = (float(np.linalg.norm(one[i] - one[j])) for one in corrected)
+        ends[f"{names[i]} to {names[j]}"] = ends[f"{names[j]} to {names[i]}"] = second - first, u[k]
+    counts = dict.fromkeys(
+        ("body diagonals", "face diagonals", "edges", "lengths through the volume"), 0
+    )
+    of_points = {}
+    for one in told["figures"]:
+        if one["kind"] in counts:
+            counts[one["kind"]] += 1
+            # Differences are linear: of errors of a few micrometres in half a metre.
+            assert one["difference"] == pytest.approx(ends[one["figure"]][0], abs=2e-11)
+            assert one["standard uncertainty"] == pytest.approx(ends[one["figure"]][1], rel=1e-3)
+        elif one["kind"] == "errors at points of the volume":
+            of_points[one["figure"]] = one["difference"]
+    assert list(counts.values()) == [4, 12, 12, 351]
+    moved = (corrected[1] - corrected[0]).ravel()
+    turns = np.stack([np.cross(axis, points - 0.5) for axis in np.eye(3)], axis=2).reshape(-1, 3)
+    moving = np.hstack([np.tile(np.eye(3), (27, 1)), turns])
+    motion = np.linalg.lstsq(moving, moved)[0]
+    assert [one["value"] for one in told["motion"]] == pytest.approx(motion, abs=1e-11)
+    left = (moved - moving @ motion).reshape(-1, 3)
+    assert of_points == {
+        f"{axis} at {name}": pytest.approx(value, abs=1e-11)
+        for name, row in zip(names, left, strict=True)
+        for axis, value in zip("xyz", row, strict=True)
+    }
+    for group in told["groups"]:
+        mine = [one for one in told["figures"] if one["kind"] == group["kind"]]
+        known = [one for one in mine if one["E_n"] is not None]
+        assert (group["count"], group["undetermined"]) == (len(known), 0)
+        assert group["exceeding"] == sum(abs(one["E_n"]) > 1.0 for one in known)
+
+
+def test_text_says_what_the_data_say(maps: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    told = printed(capsys, "diff", *maps)
+    assert main(["diff", *maps]) == 0
+    lines = capsys.readouterr().out.splitlines()
+
+    def table(heading: str) -> list[list[str]]:
+        start = next(k for k, line in enumerate(lines) if line.startswith(heading)) + 1
+        end = lines.index("", start) if "" in lines[start:] else len(lines) - 1
+        return [re.split("  +", line) for line in lines[start:end]]
+
+    motion = [
+        [one["name"], number(1e6 * one["value"]), number(2e6 * one["standard_uncertainty"])]
+        for one in told["motion"]
+    ]
+    assert [row[:3] for row in table("free motion")] == motion
+    figures = {f"{one['kind']}: {one['figure']}": one for one in told["figures"]}
+    years, shown = told["years"], table("length  ")
+    for name, *row in shown:
+        size, u = (1e6 * figures[name][key] for key in ("difference", "standard uncertainty"))
+        expected = [number(size), number(2.0 * u), number(figures[name]["E_n"], 3)]
+        assert row == [*expected, number(size / years), number(2.0 * u / years)]
+    kinds = [row[0].partition(":")[0] for row in shown]
+    assert [kinds.count(kind) for kind in dict.fromkeys(kinds)] == [4, 3, 3, 3]
+    tests = {one["what"]: one for one in told["tests"]}
+    groups = {one["kind"]: one for one in told["groups"]}
+
+    def largest(of: list[str], size: str, at: str) -> bool:
+        """Whether a place has the largest |E_n|; some are equal but for rounding."""
+        every = {name: one["E_n"] for name, one in figures.items() if name.partition(":")[0] in of}
+        most = max(abs(one) for one in every.values() if one is not None)
+        (here,) = (one for name, one in every.items() if name.endswith(f": {at}"))
+        return size == number(most, 3) and abs(here) == pytest.approx(most)
+
+    for words, size, at, *row in table("error function  "):
+        name = words.split()[0]
+        assert largest([name], size, f"{name} at {at}")
+        statistic, p = number(tests[name]["chi_squared"]), number(tests[name]["p"], 2)
+        assert row == [statistic, str(tests[name]["dimensions"]), p]
+    for kind, count, exceeding, share, size, at in table("figures  "):
+        mine = [kind] if kind in groups else [name for name in groups if len(name) == 3]
+        whole, above = (sum(groups[one][key] for one in mine) for key in ("count", "exceeding"))
+        assert (count, exceeding) == (str(whole), f"{above} ({100 * above / whole:.1f} %)")
+        assert share == f"{100 * groups[mine[0]]['share_by_chance']:.1f} %"
+        assert largest(mine, size, at)
 
 
 def test_the_same_readings_twice_are_no_agreement(
@@ -143,6 +243,9 @@ def test_an_expected_map_is_compared_with(
     same = next(one for one in wider["figures"] if one["figure"] == edge["figure"])
     u = np.hypot(edge["standard uncertainty"], 0.5 * (4e-6 + 0.9e-5))
     assert same["standard uncertainty"] == pytest.approx(u, rel=1e-9)
+    # It states uncertainties of squareness errors.
+    assert main(["diff", str(machine), str(path), "--grid", "2"]) == 0
+    assert "npl-like is no measurement, and is as well known as" in capsys.readouterr().out
 
 
 def test_what_is_undetermined_is_not_compared(capsys: pytest.CaptureFixture[str]) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import combinations
 
 import ballplate as bp
 import numpy as np
@@ -117,29 +116,6 @@ def test_a_map_moved_as_a_whole_differs_by_that_motion(fits: tuple[Fit, Fit]) ->
     assert found.motion.values[3:] == pytest.approx(motion[3:], abs=1e-12)
     shift = motion[:3] + np.cross(motion[3:], [0.5, 0.5, 0.5])
     assert found.motion.values[:3] == pytest.approx(shift, abs=1e-12)
-
-
-def dense_lengths(fit: Fit, points: Array, pairs: Array) -> tuple[Array, Array]:
-    """Lengths (m,) between corrected points and their covariance (m, m), by the fit's own way."""
-    found = fit.correct(points, "down")
-    apart = found.points[pairs[:, 1]] - found.points[pairs[:, 0]]
-    length = np.linalg.norm(apart, axis=1)
-    rows = np.zeros((len(pairs), *points.shape))
-    for k, (i, j) in enumerate(pairs):
-        rows[k, j], rows[k, i] = apart[k] / length[k], -apart[k] / length[k]
-    flat = rows.reshape(len(pairs), -1)
-    return length, flat @ found.covariance @ flat.T
-
-
-def test_lengths_are_those_of_the_corrected_points(fits: tuple[Fit, Fit]) -> None:
-    comparison = compared(map_of_fit(fits[0]), map_of_fit(fits[1]), grid=3)
-    points, found = comparison.points, comparison.lengths[-1]
-    pairs = np.array(list(combinations(range(27), 2)))
-    (first, one), (second, other) = (dense_lengths(fit, points, pairs) for fit in fits)
-    assert found.differences == pytest.approx(second - first, abs=1e-10)
-    assert found.standard_uncertainties == pytest.approx(np.sqrt(np.diag(one + other)), rel=1e-4)
-    expected = (second - first) / (2.0 * np.sqrt(np.diag(one + other)))
-    assert found.normalised == pytest.approx(expected, abs=1e-3)
 
 
 def test_the_joint_test_is_that_of_the_parameters(fits: tuple[Fit, Fit]) -> None:

@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import re
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from ballplate.cli import main
 from ballplate.extensions.maps.error_sources import CONVENTION
 from ballplate.extensions.maps.map_places import PlacesAsked, map_places
 from ballplate.extensions.maps.volumetric_errors import Volumetric
+from ballplate.presentation import number
 from ballplate.simulator.experiment.machine_file import load_machine
 from ballplate.simulator.machines.description import reference_functions, stated_function
 
@@ -63,6 +65,52 @@ def test_text(scales: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "; largest U of a co-ordinate 1.00 µm" in out
 
 
+@pytest.mark.parametrize("machine", [BRIDGE, MEASURED])
+def test_text_says_what_the_data_say(machine: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    options = ("--grid", "3,2,2", "--draw", "2")
+    assert run("map", machine, *options, "--json") == 0
+    told = json.loads(capsys.readouterr().out)
+    assert run("map", machine, *options) == 0
+    lines = capsys.readouterr().out.splitlines()
+    tables = [list(rows) for is_row, rows in groupby(lines, lambda one: "  " in one) if is_row]
+    lengths, points, drawn = ([re.split("  +", row.strip()) for row in one[1:]] for one in tables)
+
+    def shown(row: list[str], *values: float) -> bool:
+        # Two digits of the uncertainty, or three of what is shown.
+        return [float(cell) for cell in row] == pytest.approx(list(values), rel=6e-3, abs=6e-3)
+
+    at = {tuple(one["position"]): np.array(one["error"]) for one in told["grid"]}
+    for (name, start, end, *row), one in zip(lengths, told["lengths"], strict=True):
+        ends = [np.array(one[key]) for key in ("from", "to")]
+        assert [start, end] == [f"({', '.join(f'{1e3 * x:.10g}' for x in end)})" for end in ends]
+        moved = [end + at[tuple(end.tolist())] for end in ends]
+        length = float(np.linalg.norm(ends[1] - ends[0]))
+        error = float(np.linalg.norm(moved[1] - moved[0])) - length
+        assert (one["length"], one["error"]) == pytest.approx((length, error), abs=1e-12)
+        assert name == one["name"] and row[0] == f"{1e3 * length:.3f}"
+        assert shown(row[1:], 1e6 * error, 1e6 * one["expanded_uncertainty"])
+    for row, one in zip(points, told["grid"], strict=True):
+        assert one["resultant"] == pytest.approx(np.linalg.norm(one["error"]))
+        values = [*one["error"], *one["expanded_uncertainty"], one["resultant"]]
+        assert shown(row, *(1e3 * x for x in one["position"]), *(1e6 * x for x in values))
+    resultants = np.array([one["resultant"] for one in told["grid"]])
+    worst = told["grid"][int(resultants.argmax())]
+    place = ", ".join(f"{1e3 * x:.10g}" for x in worst["position"])
+    ranges = [*np.ptp(list(at.values()), axis=0), np.ptp(resultants)]
+    words = zip(("X", "Y", "Z", "resultant"), ranges, strict=True)
+    u = max(max(one["expanded_uncertainty"]) for one in told["grid"])
+    assert (
+        f"range in µm: {', '.join(f'{name} {number(1e6 * one)}' for name, one in words)}; largest"
+        f" resultant {number(1e6 * resultants.max())} µm at ({place}) mm; largest U of a"
+        f" co-ordinate {number(1e6 * u, 3)} µm"
+    ) in lines
+    draws = told["realisations"]
+    for k, (count, *row) in enumerate(drawn):
+        size = np.linalg.norm(draws["errors"][k], axis=1).max()
+        assert count == str(k + 1)
+        assert shown(row, 1e6 * size, *(1e6 * one for one in draws["lengths"][k]))
+
+
 def test_what_rounds_to_zero_has_no_sign(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -88,10 +136,7 @@ def test_json_has_full_precision(capsys: pytest.CaptureFixture[str]) -> None:
     assert found["arrangement"] == "MB1" and found["coverage_factor"] == 1.0
     assert run("map", ARM, "--curves", "--json") == 0
     phi1 = json.loads(capsys.readouterr().out)["numbers"][0]
-    assert (phi1["value"], phi1["meaning"]) == (
-        pytest.approx(7.2e-6),
-        wording.TILT_OF_THE_COLUMN,
-    )
+    assert (phi1["value"], phi1["meaning"]) == (pytest.approx(7.2e-6), wording.TILT_OF_THE_COLUMN)
 
 
 def test_a_line_between_two_points(capsys: pytest.CaptureFixture[str]) -> None:

@@ -10,10 +10,13 @@ tenth and fewer than 5 %: most data sets differ by more than the report's.
 
 from __future__ import annotations
 
+import statistics
 from pathlib import Path
+from typing import Any
 
 import pytest
-from ballplate.extensions.reproduction.compare import compare_difference
+from ballplate.estimators import compare_estimators
+from ballplate.extensions.reproduction import compare
 from ballplate.extensions.reproduction.published import npl
 from ballplate.extensions.reproduction.shipped import Shipped
 
@@ -26,8 +29,27 @@ from ballplate.extensions.reproduction.shipped import Shipped
     ],
     ids=lambda value: getattr(value, "design", value),
 )
-def test_the_reports_differences_lie_in_the_distribution(difference, trials: int) -> None:  # type: ignore[no-untyped-def]
-    found = compare_difference(
+def test_the_reports_differences_lie_in_the_distribution(  # type: ignore[no-untyped-def]
+    difference, trials: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = []
+
+    def estimated(*arguments: Any, **options: Any) -> Any:
+        made.append(compare_estimators(*arguments, **options))
+        return made[-1]
+
+    monkeypatch.setattr(compare, "compare_estimators", estimated)
+    found = compare.compare_difference(
         npl(), Shipped(Path("designs/npl")), difference, trials, lambda *_: None
     )
     assert len(found) == 5 and all(row.agrees for row in found), found
+    assert [row.computed for row in found] == [
+        0,
+        statistics.median(made[0].rms),
+        sum(one < difference.rms for one in made[0].rms) / trials,
+        statistics.median(made[0].maximum),
+        sum(one < difference.maximum for one in made[0].maximum) / trials,
+    ]
+    # The published one is neither the least nor the largest.
+    assert found[1].within == found[3].within == (1 / npl().limits.median, npl().limits.median)
+    assert found[2].within == found[4].within == pytest.approx((1 / trials, 1 - 1 / trials))

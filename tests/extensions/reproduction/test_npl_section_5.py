@@ -59,9 +59,7 @@ QUICK = ("5.2", "5.3[empirical fit]", "5.4[kinematic machine, kinematic fit]")
     "published",
     [
         pytest.param(
-            one,
-            id=one.design,
-            marks=[] if one.design.startswith(QUICK) else [pytest.mark.long],
+            one, id=one.design, marks=[] if one.design.startswith(QUICK) else [pytest.mark.long]
         )
         for one in npl().convergence
     ],
@@ -70,54 +68,6 @@ def test_published_iterations(published, monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(compare, "fitted_exactly", fitted_once)
     found = compare_iterations(npl(), SHIPPED, published)
     assert found and all(row.agrees for row in found), found
-
-
-@pytest.mark.parametrize(
-    ("name", "variant"),
-    [
-        ("5.2", "kinematic fit"),
-        ("5.4", "kinematic machine, kinematic fit"),
-        ("5.2", "empirical fit"),
-    ],
-)
-def test_a_fit_that_contains_the_machine_converges_in_three_iterations(
-    name: str, variant: str
-) -> None:
-    """Tables 1 and 3: steps of about 1e-4, 1e-8 and 1e-13, and readings met exactly."""
-    found = fitted(name, variant)
-    assert found.verdict.deficiency == 0 and found.solution.status == "converged"
-    first, second, third, *rest = steps(found)
-    assert 3e-5 < first < 1e-3
-    assert 1e-10 < second < 1e-7
-    assert third < 1e-11
-    assert not rest
-    at_first, *_, at_last = sums_of_squares(found)
-    assert 1e-9 < at_first < 1e-7
-    assert at_last < 1e-22
-
-
-@pytest.mark.long
-@pytest.mark.parametrize(
-    ("name", "variant"), [("5.3", "kinematic fit"), ("5.4", "empirical machine, kinematic fit")]
-)
-def test_a_kinematic_fit_cannot_follow_an_empirical_machine(name: str, variant: str) -> None:
-    """Tables 2 and 4: it converges all the same, with a sum of squares orders of magnitude above
-    what exact readings leave. Table 4 ends at 2.6e-10 m^2.
-    """
-    found = fitted(name, variant)
-    assert found.solution.status == "converged"
-    last = sums_of_squares(found)[-1]
-    assert 1e-11 < last < 1e-8
-    # Anybody would notice: the sum of squares is far above the degrees of freedom, about which it
-    # should be.
-    assert found.solution.factor.sum_of_squares > 10 * found.degrees_of_freedom
-
-
-def test_an_empirical_fit_follows_an_empirical_machine() -> None:
-    """Table 2."""
-    found = fitted("5.3", "empirical fit")
-    assert found.solution.status == "converged" and len(steps(found)) <= 3
-    assert sums_of_squares(found)[-1] < 1e-22
 
 
 NAMED = re.compile(r"E[XYZABC] \((error in|rotation about) [XYZ], .*along [XYZ] at")

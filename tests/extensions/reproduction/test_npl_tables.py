@@ -4,6 +4,7 @@ them.
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 
@@ -92,6 +93,23 @@ def averages_of_draws(design: Design) -> np.ndarray:
     places = MeasuredPoints(points, np.full(count, design.evaluation.probe))
     found = displacements(linearise(design), places).uncertainties
     return np.asarray(found.reshape(60, -1).mean(axis=1))
+
+
+def test_remarks_are_compared_with_all_ratios_of_averages(shipped: Shipped) -> None:
+    for remark in npl().remarks:
+        if remark.quantities == ("S^2",):
+            continue
+        ratios = [
+            planned(shipped, design).quantities[symbol].average
+            / (2e-7 if of == "repeatability" else planned(shipped, of).quantities[symbol].average)
+            for design, of in remark.pairs
+            for symbol in remark.quantities
+        ]
+        low, high = remark.at_least, remark.at_most
+        expected = [("least ratio", min(ratios), (low, math.inf))] * (low is not None)
+        expected += [("largest ratio", max(ratios), (0.0, high))] * (high is not None)
+        found = compare_remark(shipped, remark)
+        assert [(row.quantity, row.computed, row.within) for row in found] == expected
 
 
 # The remarks and figures of section 6 are those of the command.
