@@ -100,7 +100,7 @@ def test_examples_have_run(built: Path) -> None:
     for figure in ("0.2623", "1.525"):
         assert figure in tutorial
     text = Page(built / "tutorial-fit.html").text
-    for figure in ("3.13(0.23)", "0.9594", "12.238", "0.377"):
+    for figure in ("3.13 ± 0.23 µm", "0.9594", "12.238", "0.377"):
         assert figure in text
     assert "<mtable" in (built / "explanation/mathematics.html").read_text(encoding="utf-8")
 
