@@ -46,10 +46,8 @@ def sweep(
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     path = f"{folder}/plates.sqlite"
-    ...     computed = sweep("designs/sweeps/plate-size.yaml", path)
-    ...     computed, stored(path).to_frame().equals(computed.to_frame())
-    (<SweepResult of plate-size: 12 cases, 12 done, 0 failed>, True)
+    ...     sweep("designs/sweeps/plate-size.yaml", f"{folder}/plates.sqlite")
+    <SweepResult of plate-size: 12 cases, 12 done, 0 failed>
     """
     from .load import load_sweep
     from .running import computed
@@ -69,6 +67,13 @@ def stored(store: PathLike, sweep: int | None = None) -> SweepResult:
     far.
 
     :raises StoreError: the store cannot be used, or is damaged.
+
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     path = f"{folder}/plates.sqlite"
+    ...     computed = sweep("designs/sweeps/plate-size.yaml", path)
+    ...     stored(path).to_frame().equals(computed.to_frame())
+    True
     """
     from contextlib import closing
 
