@@ -185,7 +185,7 @@ def interrupted(
 
 
 # With workers and without, with files and without, with a store; the others are as these.
-SOME = ("run by two", "plan by one", "sweep by one", "report")
+SOME = ("run by two", "plan by one", "sweep by one")
 
 
 @pytest.mark.parametrize("name", SOME)
