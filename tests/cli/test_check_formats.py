@@ -42,6 +42,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     good = QUICKSTART.read_text(encoding="utf-8")
     (tmp_path / "good.yaml").write_text(good, encoding="utf-8")
     symmetrical = SYMMETRICAL.read_text(encoding="utf-8").replace("deficiency: 2", "deficiency: 1")
+    symmetrical = symmetrical.replace("random: 100", "random: 12").replace("[7, 7]", "[5, 5]")
     (tmp_path / "wrong.yaml").write_text(symmetrical, encoding="utf-8")
     (tmp_path / "broken.yaml").write_text(
         good.replace("0.2 um            #", "100 %             #"), encoding="utf-8"

@@ -10,6 +10,7 @@ import shlex
 import shutil
 from collections.abc import Iterator
 from functools import cache
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ import openpyxl
 import pytest
 
 from tests.cli.option_table import READING, TABLE, TABLES
+from tests.cli.outcomes import are_alike, changes, kept, shortened
 from tests.cli.walk import WALK, commands
 from tests.reference.small_plate import PLATE
 from tests.robustness.kit import POOL, make_kit
@@ -57,8 +59,11 @@ ELSEWHERE = {
 
 @pytest.fixture(scope="module")
 def kit(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return filled(tmp_path_factory.mktemp("options") / "kit")
+
+
+def filled(folder: Path) -> Path:
     """A folder with all files that the lines name."""
-    folder = tmp_path_factory.mktemp("options") / "kit"
     folder.mkdir()
     make_kit(folder)
     (folder / "pipe.csv").unlink()
@@ -185,6 +190,25 @@ ALL: list[Any] = [
 ]
 
 
+def outcomes(line: str, option: str, kit: Path) -> dict[str, list[str]]:
+    """What is kept of a line, and of the line with an option."""
+    if "--verbose" in option:
+        return {}
+    lines = [
+        shortened(written(one, kit), kit.with_name("copy")) for one in (line, f"{line} {option}")
+    ]
+    return {line: lines[0], f"{line}  with  {option}": changes(*lines)}
+
+
+def every_outcome(kit: Path) -> dict[str, list[str]]:
+    rows = [row for row in ALL if not getattr(row, "marks", ())]
+    return {
+        name: lines
+        for line, option, _ in (getattr(row, "values", row) for row in rows)
+        for name, lines in outcomes(line, option, kit).items()
+    }
+
+
 @pytest.mark.parametrize(("line", "option", "text"), ALL)
 def test_option(line: str, option: str, text: str, kit: Path) -> None:
     without, with_it = written(line, kit), written(f"{line} {option}", kit)
@@ -192,6 +216,10 @@ def test_option(line: str, option: str, text: str, kit: Path) -> None:
         with_it, without = without, with_it
         text = text.removeprefix("without: ")
     assert text in with_it and text not in without
+    # A change of any other line is one that someone saw.
+    for name, lines in outcomes(line, option, kit).items():
+        for found, was in zip_longest(lines, kept()[name], fillvalue=""):
+            assert are_alike(found, was), name
 
 
 def test_every_option_is_in_the_table() -> None:

@@ -193,7 +193,7 @@ def test_a_signal_leaves_files_old_or_new_together(
     is_there: bool, files: Path, tmp_path: Path
 ) -> None:
     """At a sample of all openings, links, changes of names and removals."""
-    task = {"signals": SIGNALS, "every": 7 if is_there else 3, "slow": is_there}
+    task = {"signals": SIGNALS, "every": 11 if is_there else 3, "slow": is_there}
     states = [
         ensure_whole(*one)
         for one in cuts(("simulate", "sheet"), files, tmp_path / "written", is_there, **task)

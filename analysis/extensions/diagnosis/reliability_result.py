@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 
 # Effects below this share of the bias, in metres per unit, are neglected.
 NO_EFFECT = 1e-6
+# Below this share they are rounding.
+NOTHING = 1e-9
 
 # Rows of a table of single observations.
 MOST = 5
@@ -178,20 +180,19 @@ class Reliability(Result):
         of a task.
         """
         changes = [self.across, *(self.effects[symbol].change for symbol in self.lengths)]
-        return all(change[k] <= NO_EFFECT * self.size(k) for change in changes)
+        return all(change[k] <= NO_EFFECT * self.sizes[k] for change in changes)
 
     @property
     def lengths(self) -> list[str]:
         """Symbols of effects on lengths."""
         return [symbol for symbol in self.effects if QUANTITIES[symbol].are_lengths]
 
-    def size(self, k: int) -> float:
-        """Return the approximate displacement, in metres, by a unit of a bias."""
-        return 1.0 if self.patterns.unit(k) == "m" else self._extent
-
     @cached_property
-    def _extent(self) -> float:
-        return max(float(np.ptp(self.design.balls.places, axis=0).max(initial=0.0)), 1e-3)
+    def sizes(self) -> Array:
+        """Approximate displacements (k,), in metres, by a unit of each bias."""
+        extent = max(float(np.ptp(self.design.balls.places, axis=0).max(initial=0.0)), 1e-3)
+        units = map(self.patterns.unit, range(len(self.patterns)))
+        return np.array([1.0 if unit == "m" else extent for unit in units])
 
 
 def _heading(result: Reliability) -> list[str]:
@@ -279,9 +280,12 @@ def _table(
 ) -> list[str]:
     def effect_words(symbol: str) -> Callable[[int], str]:
         def words(k: int) -> str:
-            change = _effect_number(result, symbol, k, effects[symbol][k])
+            if math.isnan(effects[symbol][k]):
+                return "-"
             uncertainty = number(1e6 * result.effects[symbol].uncertainty[k], 3)
-            return "-" if math.isnan(effects[symbol][k]) else f"{change} ({uncertainty})"
+            change = number(1e6 * effects[symbol][k], 3)
+            # Where none changes, no length is meant and no uncertainty of one.
+            return f"{change} ({uncertainty})" if effects[symbol][k] else "0"
 
         return words
 
@@ -299,19 +303,15 @@ def _table(
     return table_lines(columns, chosen, None if with_redundancy else "redundancy")
 
 
-def _effect_number(result: Reliability, symbol: str, k: int, effect: float) -> str:
-    """Return an effect in micrometres, 0 if it is rounding."""
-    if result.effects[symbol].change[k] <= 1e-9 * result.size(k):
-        return "0"
-    return number(1e6 * effect, 3)
-
-
 def _effect(result: Reliability, symbol: str) -> np.ndarray:
-    """Return effects (k,) of biases of the size of the MDB; NaN if undetectable or undetermined."""
+    """Return effects (k,) of biases of the size of the MDB, 0 if they are rounding; NaN if
+    undetectable or undetermined.
+    """
     effects = result.effects[symbol]
     is_defined = np.isfinite(result.minimal_detectable) & (effects.first >= 0)
+    change = np.where(effects.change > NOTHING * result.sizes, effects.change, 0.0)
     with np.errstate(invalid="ignore"):
-        return np.where(is_defined, result.minimal_detectable * effects.change, np.nan)
+        return np.where(is_defined, result.minimal_detectable * change, np.nan)
 
 
 def _finite_or_zero(values: np.ndarray) -> np.ndarray:
@@ -361,9 +361,9 @@ def _closing(result: Reliability) -> list[str]:
         parts = [
             f"{symbol} by up to {number(result.effects[symbol].change[k], 3)} µm per {SHOWN[unit]}"
             for symbol in result.lengths
-            if result.effects[symbol].change[k] > NO_EFFECT * result.size(k)
+            if result.effects[symbol].change[k] > NO_EFFECT * result.sizes[k]
         ]
-        if result.across[k] > NO_EFFECT * result.size(k):
+        if result.across[k] > NO_EFFECT * result.sizes[k]:
             text = f"{number(result.across[k], 3)} µm per {SHOWN[unit]}"
             parts.append(f"distances between points of tasks' probes by up to {text}")
         lines.append(
@@ -420,7 +420,7 @@ def _location(result: Reliability, symbol: str, k: int) -> str:
     """Return the points of the largest effect."""
     effects, design = result.effects[symbol], result.design
     first, second = int(effects.first[k]), int(effects.second[k])
-    if first < 0 or result.effects[symbol].change[k] <= 1e-9 * result.size(k):
+    if first < 0 or result.effects[symbol].change[k] <= NOTHING * result.sizes[k]:
         return ""
     return function_name(design, effects.functions[0], first, second)
 

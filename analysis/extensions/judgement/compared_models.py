@@ -196,9 +196,11 @@ def _untested(design: Design) -> str:
 
 def _change_of_lengths(one: Linearisation, other: Linearisation) -> tuple[float, float]:
     """Return the largest and the root mean square difference of two fits in the lengths between
-    all evaluation points.
+    all evaluation points, 0 where it is rounding.
     """
-    change = _lengths(one.design, one.state) - _lengths(other.design, other.state)
+    lengths = _lengths(other.design, other.state)
+    change = _lengths(one.design, one.state) - lengths
+    change[np.abs(change) <= ROUNDING * lengths] = 0.0
     return float(np.abs(change).max()), float(np.sqrt((change**2).mean()))
 
 

@@ -142,7 +142,7 @@ class ComparedModels(FitResult):
             sentence = "has more parameters than the readings need"
         else:
             apart = file.bic - chosen.bic
-            sentence = f"is not nested with these; its BIC differs by {apart:+.1f}"
+            sentence = f"is not nested with these; its BIC differs by {round(apart, 1) + 0.0:+.1f}"
         sentence = f"the file's error model, {file.model.removeprefix(FILE)}, {sentence}"
         if self.lengths.undetermined:
             return sentence

@@ -23,8 +23,8 @@ def repair(path: PathLike, variant: str | None = None) -> str:
         change the rest of the file.
 
     >>> import ballplate as bp
-    >>> line = "    positions[z low].quarter_turns: 1"
-    >>> line in bp.repair("designs/npl/6.1.1.yaml", variant="B").splitlines()
+    >>> turned = "{name: straight, corner: {x: 250 mm, y: 250 mm}, quarter_turns: 1}"
+    >>> turned in bp.repair("designs/hocken_borchardt/angles.yaml", variant="shifted only")
     True
     """
     from ballplate.results import check

@@ -28,7 +28,9 @@ def drafted(sheet: dict[str, str], **changed: str) -> str:
     return draft(data_sheet(stated), stated, "next")
 
 
-@pytest.mark.parametrize("name", ["bridge", "arm", pytest.param("gantry", marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "name", ["bridge", *(pytest.param(name, marks=pytest.mark.long) for name in ("arm", "gantry"))]
+)
 def test_three_machines(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The start and the whole pool determine everything, and the pool fills the volume."""
     path = tmp_path / f"{name}.yaml"

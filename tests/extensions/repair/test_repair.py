@@ -316,7 +316,7 @@ def test_single_changes_are_those_of_a_complete_search(
 def test_pairs_of_moves_are_those_of_a_complete_search(tmp_path: Path) -> None:
     """With a target that one move does not meet."""
     experiment = loaded(few(example()), tmp_path)
-    moves = [one for one in candidates(experiment) if one.kind is ChangeKind.MOVE][::6]
+    moves = [one for one in candidates(experiment) if one.kind is ChangeKind.MOVE][::8]
     best = [min(u6 for _, u6, _ in everything(experiment, moves, size)) for size in (1, 2)]
     assert best[1] < 0.95 * best[0]
     pool = change_pool(experiment, moves)

@@ -142,9 +142,11 @@ def test_killed_before_a_statement(tmp_path: Path, every: int) -> None:
 
 @pytest.mark.slow
 def test_a_worker_is_killed_and_a_disk_takes_no_more(
-    tmp_path: Path, started: Callable[..., subprocess.Popen[str]]
+    tmp_path: Path,
+    started: Callable[..., subprocess.Popen[str]],
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    path, store = small_sweep(tmp_path, 6, "trials: 4\n"), tmp_path / "small.sqlite"
+    path, store = small_sweep(tmp_path, 4, "trials: 2\n"), tmp_path / "small.sqlite"
     undisturbed = tmp_path / "undisturbed.sqlite"
     assert main(["sweep", str(path), "--store", str(undisturbed), "--workers", "1"]) == 1
 
@@ -159,9 +161,10 @@ def test_a_worker_is_killed_and_a_disk_takes_no_more(
     assert wait_until(lambda: stored(store) > before, process)
     os.kill(children(process.pid)[0], signal.SIGKILL)
     process.communicate(timeout=240)
-    last = run("sweep", path)
-    assert last.returncode == 1 and "Traceback" not in last.stderr, last.stderr
-    assert "12 cases" in last.stdout and "left" not in last.stdout
+    capsys.readouterr()
+    assert main(["sweep", str(path), "--workers", "1"]) == 1
+    last = capsys.readouterr()
+    assert "8 cases" in last.out and "left" not in last.out and "Traceback" not in last.err
     assert_same(rows(store), rows(undisturbed))
 
 

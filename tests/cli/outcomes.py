@@ -1,0 +1,111 @@
+"""What commands print and write, kept as text: that of a line in full, of each option what it adds
+and what it takes away.
+
+`python -m tests.cli.outcomes` writes the files of the folder `outcomes` anew; look at what changed
+before it is committed.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from zlib import crc32
+
+FOLDER = Path(__file__).parent / "outcomes"
+NUMBER = re.compile(r"(?<![#0-9a-f.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+# Lines with what is nothing but rounding.
+NOTHING = re.compile(r"\de-(1[4-9]|[2-9]\d)\b")
+# In drawings of Matplotlib, whose releases draw differently.
+MADE_ELSEWHERE = 'id="figure_1"'
+# Parts that are longer, as pages and drawings, are kept by what their numbers and words come to.
+LONGEST = 6_000
+# Today, and what a last digit changes altogether.
+CHANGING = (
+    r"\d{4}-\d\d-\d\d \d\d:\d\d UTC|(?<![.\w])[0-9a-f]{12,}\b|"
+    r"openblas [^<]*"
+)
+
+
+def shortened(outcome: str, folder: Path) -> list[str]:
+    """Lines of an outcome without what changes from day to day."""
+    text = re.sub(CHANGING, "CHANGING", outcome.replace(str(folder), "FOLDER"))
+    lines = list[str]()
+    for part in re.split(r"^(?=--file )", text, flags=re.MULTILINE):
+        head, _, rest = part.partition("\n")
+        if len(part) <= LONGEST and MADE_ELSEWHERE not in part:
+            lines += part.splitlines()
+        elif "<svg" not in part or MADE_ELSEWHERE in part:
+            # Data in full end with digits that are rounding, which no sum leaves out.
+            lines.append(head)
+        else:
+            numbers = [abs(float(one)) for one in NUMBER.findall(rest)]
+            words = " ".join(NUMBER.sub("#", rest).split())
+            told = f"{len(numbers)} numbers, {sum(numbers):.5e} in all"
+            lines += [head, f"... {told}, words {crc32(words.encode()) % 10**8:08d}."]
+    kept = [" ".join(line.split()) for line in lines if not NOTHING.search(line)]
+    return [line for line in kept if line]
+
+
+def changes(without: Sequence[str], with_it: Sequence[str]) -> list[str]:
+    """What an option adds to an outcome, and what it takes away."""
+    added = [f"+ {line}" for line in with_it if line not in without]
+    return added + [f"- {line}" for line in without if line not in with_it]
+
+
+def are_alike(one: str, other: str) -> bool:
+    """Whether two lines say the same; processors round numbers differently.
+
+    >>> are_alike("U6 0.2591 µm of 4", "U6 0.2592 µm of 4"), are_alike("U6 0.26 of 4", "U6 0.26 of 5")
+    (True, False)
+    """
+    if NUMBER.sub("#", one) != NUMBER.sub("#", other):
+        return False
+    return all(map(_is_near, NUMBER.findall(one), NUMBER.findall(other)))
+
+
+def _is_near(one: str, other: str) -> bool:
+    mantissa, _, exponent = one.partition("e")
+    decimals = mantissa.partition(".")[2]
+    a, b = float(one), float(other)
+    if not decimals:
+        return a == b
+    if len(decimals) > 8:
+        # A number in full; what is less than 1e-15 is zero, rounded.
+        return abs(a - b) <= max(1e-6 * abs(a), 1e-15)
+    return abs(a - b) <= 1.01 * 10.0 ** (int(exponent or 0) - len(decimals))
+
+
+@cache
+def kept() -> dict[str, list[str]]:
+    """Kept lines, by the command line and the option."""
+    found: dict[str, list[str]] = {}
+    for path in sorted(FOLDER.glob("*.txt")):
+        for block in path.read_text("utf-8").split("\n$ ")[1:]:
+            name, *lines = block.rstrip("\n").split("\n")
+            found[name] = lines
+    return found
+
+
+def keep(outcomes: Mapping[str, Sequence[str]]) -> None:
+    """Write what is kept, a file for each command."""
+    FOLDER.mkdir(exist_ok=True)
+    texts: dict[str, str] = {}
+    for name, lines in outcomes.items():
+        command = re.sub(r"\W+", "-", name.split("'")[1] if name[0] == "'" else name.split()[0])
+        text = texts.setdefault(command, "Written by `python -m tests.cli.outcomes`.\n")
+        texts[command] = text + "\n".join([f"\n$ {name}", *lines, ""])
+    for path in FOLDER.glob("*.txt"):
+        path.unlink()
+    for command, text in texts.items():
+        (FOLDER / f"{command}.txt").write_text(text, "utf-8")
+
+
+if __name__ == "__main__":
+    from tempfile import TemporaryDirectory
+
+    from tests.cli.test_options import every_outcome, filled
+
+    with TemporaryDirectory() as place:
+        keep(every_outcome(filled(Path(place) / "kit")))
