@@ -137,7 +137,9 @@ def written(line: str, kit: Path) -> str:
     before = stamps(folder)
     status, out, err = outcome(shlex.split(line), folder)
     parts, after = [f"status {status}", out, err], stamps(folder)
-    for path in sorted(path for path in after if after[path] != before.get(path)):
+    changed = (path for path in after if after[path] != before.get(path))
+    # Whether a lock is left is chance.
+    for path in sorted(path for path in changed if path.suffix != ".lock"):
         parts += [f"--file {path.name}", path.read_bytes().decode("utf-8", "replace")]
         path.unlink()
     for path in before:
