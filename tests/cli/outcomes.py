@@ -16,7 +16,7 @@ from zlib import crc32
 FOLDER = Path(__file__).parent / "outcomes"
 NUMBER = re.compile(r"(?<![#0-9a-f.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 # Lines with what is nothing but rounding.
-NOTHING = re.compile(r"\de-(1[4-9]|[2-9]\d)\b")
+NOTHING = re.compile(r"\de-(09|[1-9]\d)\b")
 # In drawings of Matplotlib, whose releases draw differently.
 MADE_ELSEWHERE = 'id="figure_1"'
 # Parts that are longer, as pages and drawings, are kept by what their numbers and words come to.
@@ -24,7 +24,7 @@ LONGEST = 6_000
 # Today, and what a last digit changes altogether.
 CHANGING = (
     r"\d{4}-\d\d-\d\d \d\d:\d\d UTC|(?<![.\w])[0-9a-f]{12,}\b|"
-    r"openblas [^<]*"
+    r"openblas [^<]*|about [0-9.]+ (s|min)"
 )
 
 
@@ -36,16 +36,22 @@ def shortened(outcome: str, folder: Path) -> list[str]:
         head, _, rest = part.partition("\n")
         if len(part) <= LONGEST and MADE_ELSEWHERE not in part:
             lines += part.splitlines()
-        elif "<svg" not in part or MADE_ELSEWHERE in part:
-            # Data in full end with digits that are rounding, which no sum leaves out.
+        elif MADE_ELSEWHERE in part or head.endswith((".sqlite", ".parquet")):
             lines.append(head)
         else:
-            numbers = [abs(float(one)) for one in NUMBER.findall(rest)]
-            words = " ".join(NUMBER.sub("#", rest).split())
-            told = f"{len(numbers)} numbers, {sum(numbers):.5e} in all"
-            lines += [head, f"... {told}, words {crc32(words.encode()) % 10**8:08d}."]
+            lines += [head, _digest(rest)]
     kept = [" ".join(line.split()) for line in lines if not NOTHING.search(line)]
     return [line for line in kept if line]
+
+
+def _digest(text: str) -> str:
+    """What the words of a page, a table or a drawing, and its numbers, or the keys of data come to;
+    data have numbers that are nothing but rounding.
+    """
+    numbers = [abs(float(one)) for one in NUMBER.findall(text)]
+    words = " ".join(sorted({*re.findall(r'"[^"]*":', text)}) or NUMBER.sub("#", text).split())
+    told = f"... words {crc32(words.encode()) % 10**8:08d}"
+    return f"{told}, {len(numbers)} numbers, {sum(numbers):.5e} in all" if "<svg" in text else told
 
 
 def changes(without: Sequence[str], with_it: Sequence[str]) -> list[str]:

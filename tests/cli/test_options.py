@@ -22,6 +22,7 @@ from tests.cli.outcomes import are_alike, changes, kept, shortened
 from tests.cli.walk import WALK, commands
 from tests.reference.small_plate import PLATE
 from tests.robustness.kit import POOL, make_kit
+from tests.robustness.recipes import RECIPES
 from tests.robustness.worker import outcome
 
 VARIANTS = "variants: {plain: {}, coarse: {machine.repeatability: 1 um}}\n"
@@ -204,7 +205,8 @@ def outcomes(line: str, option: str, kit: Path) -> dict[str, list[str]]:
 
 def every_outcome(kit: Path) -> dict[str, list[str]]:
     rows = [row for row in ALL if not getattr(row, "marks", ())]
-    return {
+    of_recipes = {line: shortened(written(line, kit), kit.with_name("copy")) for line in RECIPES}
+    return of_recipes | {
         name: lines
         for line, option, _ in (getattr(row, "values", row) for row in rows)
         for name, lines in outcomes(line, option, kit).items()
@@ -220,8 +222,17 @@ def test_option(line: str, option: str, text: str, kit: Path) -> None:
     assert text in with_it and text not in without
     # A change of any other line is one that someone saw.
     for name, lines in outcomes(line, option, kit).items():
-        for found, was in zip_longest(lines, kept()[name], fillvalue=""):
-            assert are_alike(found, was), name
+        ensure_kept(name, lines)
+
+
+def ensure_kept(name: str, lines: list[str]) -> None:
+    for found, was in zip_longest(lines, kept()[name], fillvalue=""):
+        assert are_alike(found, was), name
+
+
+@pytest.mark.parametrize("line", RECIPES)
+def test_recipe(line: str, kit: Path) -> None:
+    ensure_kept(line, shortened(written(line, kit), kit.with_name("copy")))
 
 
 def test_every_option_is_in_the_table() -> None:
