@@ -210,13 +210,19 @@ other = "other_laboratory:EXTENSION"
 @pytest.mark.parametrize(
     ("provided", "words"),
     [
-        ('calibrations={"distances": "a"}', "distances (calibrations) is provided by ballplate"),
-        ('sections={"positions": "a"}', "positions (sections) is provided by ballplate"),
-        ('artefacts={"grid": "a"}', "grid (artefacts) is provided by ballplate"),
-        ('influences={"sag": "a"}', "sag (influences) is provided by ballplate"),
-        ('error_models={"metric": "a"}', "metric (error_models) is provided by ballplate"),
         ('quantities={"U4": "a"}', "U4 (quantities) is provided by ballplate"),
         ('calibrations={"laser": "a"}', "laser (calibrations) is provided by our_laboratory"),
+        *(
+            pytest.param(
+                f'{kind}={{"{name}": "a"}}',
+                f"{name} ({kind}) is provided by ballplate",
+                marks=pytest.mark.long,
+            )
+            for kind, name in (
+                *(("calibrations", "distances"), ("sections", "positions"), ("artefacts", "grid")),
+                *(("influences", "sag"), ("error_models", "metric")),
+            )
+        ),
     ],
 )
 def test_a_name_that_is_used_twice_is_refused(provided: str, words: str, tmp_path: Path) -> None:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import csv
-import os
 import re
 import sqlite3
-import subprocess
+from contextlib import chdir
 from pathlib import Path
 
 import ballplate as bp
@@ -26,7 +25,7 @@ from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 
 from tests.extensions.sweeps import wording
-from tests.extensions.sweeps.support import ROOT, assert_same, command, rows, run, small_sweep
+from tests.extensions.sweeps.support import assert_same, rows, run, small_sweep
 
 
 def sweep(path: Path, *options: str) -> int:
@@ -206,7 +205,7 @@ def test_what_two_sweeps_share_is_computed_once(
 def test_replicates_in_blocks_are_the_same_replicates(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path = small_sweep(tmp_path, 2, "trials: 1100\nrecord: [U5]\n")
+    path = small_sweep(tmp_path, 2, "trials: 520\nrecord: [U5]\n")
     assert BLOCK % 512 == 0
     monkeypatch.setattr("ballplate.extensions.sweeps.task.BLOCK", 512)
     assert sweep(path) == 1
@@ -214,7 +213,7 @@ def test_replicates_in_blocks_are_the_same_replicates(
     monkeypatch.undo()
     assert sweep(path, "--store", str(tmp_path / "whole.sqlite")) == 1
     whole = rows(tmp_path / "whole.sqlite")
-    assert split["trials"][0] == whole["trials"][0] == 1100
+    assert split["trials"][0] == whole["trials"][0] == 520
     for name in ("U5_spread_ratio", "U5_coverage_sigma_given", "U5_actual_average_m"):
         np.testing.assert_allclose(split[name][:2], whole[name][:2], rtol=1e-12)
     store = open_store(tmp_path / "small.sqlite")
@@ -362,9 +361,8 @@ def test_rows_do_not_depend_on_where_the_command_is_started(tmp_path: Path) -> N
         "base: quickstart.yaml", "base: ../quickstart.yaml"
     )
     (tmp_path / "sweeps" / "s.yaml").write_text(text, encoding="utf-8")
-    here = command("sweep", "s.yaml", "--workers", 1, "--store", tmp_path / "1.sqlite")
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    subprocess.run(here, cwd=tmp_path / "sweeps", env=environment, capture_output=True, check=False)
+    with chdir(tmp_path / "sweeps"):
+        assert sweep(Path("s.yaml"), "--store", str(tmp_path / "1.sqlite")) == 1
     elsewhere = ("--store", str(tmp_path / "2.sqlite"))
     assert sweep(tmp_path / "sweeps" / "s.yaml", *elsewhere) == 1
     first = rows(tmp_path / "1.sqlite")
