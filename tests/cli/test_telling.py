@@ -91,18 +91,6 @@ def test_doubts_about_the_verdict_stay(tmp_path: Path, capsys: pytest.CaptureFix
     assert plain == quiet and plain[2]
 
 
-def test_no_bar_when_quiet(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    file = small_file(tmp_path / "small.yaml")
-    with monkeypatch.context() as patched:
-        patched.setattr(type(sys.stderr), "isatty", lambda self: True)
-        shown = "".join(told(capsys, "run", "--reliability", file)[2])
-        # Three co-ordinates of 9 balls in ten positions, and four distances.
-        assert re.search("observations: .* 274/274", shown)
-        assert told(capsys, "run", "--reliability", file, "-q")[2] == []
-
-
 def test_check_shows_how_far_it_has_come(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

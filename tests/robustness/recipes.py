@@ -14,6 +14,7 @@ RECIPES = (
     "check 'sm*.yaml'",
     "run tables.yaml --report out.html",
     "run --json small.yaml",
+    "run bryan-gauge.yaml --variant 'radius known' --report out.html",
     "run small.yaml --trials 4 --seed 3 --workers 1",
     "run bar-bell.yaml --variant 'length known' --until 30% --trials 20 --workers 1",
     "plan pool.yaml --positions 2 --workers 1 -o out.yaml --sheet sheet.html",

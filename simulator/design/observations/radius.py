@@ -31,7 +31,7 @@ class RadiusCalibration(Calibration):
 
     @property
     def size(self) -> int:
-        return 0
+        return 1
 
     def certified_values(self, layout: BallLayout) -> Iterator[CertifiedValue]:
         drawn = float(np.sqrt((layout.coordinates[0] ** 2).sum()))

@@ -27,18 +27,6 @@ def table(path: Path, x: np.ndarray, errors: np.ndarray) -> Path:
     return path
 
 
-def test_text(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run(*DOME, "--start-slope", "0", "--end-value", "-19 um") == 0
-    out, err = capsys.readouterr()
-    assert err == "" and max(map(len, out.splitlines())) <= 120
-    assert "table-1.csv: semi finish error against arc length, 21 points, curve from 0 mm" in out
-    assert "prescribed: slope 0 at 0 mm\nprescribed: value -19 µm at 56.9804 mm" in out
-    assert "cubic spline, 4 knots at 12.2045," in out
-    assert "6 free coefficients, 15 degrees of freedom" in out
-    assert "one curve over nose, dome: the column feature makes no boundaries" in out
-    assert out.splitlines()[-5].split()[3] == "0"
-
-
 def test_json_is_in_metres_and_its_pieces_give_its_points(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
