@@ -11,14 +11,15 @@ import re
 from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
+from typing import Any
 from zlib import crc32
+
+import numpy as np
 
 FOLDER = Path(__file__).parent / "outcomes"
 NUMBER = re.compile(r"(?<![#0-9a-f.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 # Lines with what is nothing but rounding.
 NOTHING = re.compile(r"\de-(09|[1-9]\d)\b")
-# In drawings of Matplotlib, whose releases draw differently.
-MADE_ELSEWHERE = 'id="figure_1"'
 # Parts that are longer, as pages and drawings, are kept by what their numbers and words come to.
 LONGEST = 6_000
 # Today, and what a last digit changes altogether.
@@ -34,14 +35,44 @@ def shortened(outcome: str, folder: Path) -> list[str]:
     lines = list[str]()
     for part in re.split(r"^(?=--file )", text, flags=re.MULTILINE):
         head, _, rest = part.partition("\n")
-        if len(part) <= LONGEST and MADE_ELSEWHERE not in part:
+        if len(part) <= LONGEST:
             lines += part.splitlines()
-        elif MADE_ELSEWHERE in part or head.endswith((".sqlite", ".parquet")):
+        elif head.endswith((".sqlite", ".parquet")):
             lines.append(head)
         else:
             lines += [head, _digest(rest)]
     kept = [" ".join(line.split()) for line in lines if not NOTHING.search(line)]
     return [line for line in kept if line]
+
+
+def drawn(figure: Any) -> str:
+    """What a figure of Matplotlib has, whatever its release makes of it: places, words, numbers."""
+
+    def told(values: Any) -> str:
+        values = np.asarray(values, float)[np.isfinite(values).all(axis=1)]
+        sums = [f(values, axis=0).round(3).tolist() for f in (np.mean, np.std) if len(values)]
+        return f"{len(values)}: {sums}"
+
+    size = figure.get_size_inches().round(2).tolist()
+    lines = [f"<title>{figure.get_label()}: {size}"]
+    for axes in figure.axes:
+        ends = np.round([axes.get_xlim(), axes.get_ylim(), *axes.get_position().get_points()], 3)
+        lines.append(f"axes {axes.get_xlabel()}, {axes.get_ylabel()}: {ends.ravel().tolist()}")
+        for line in axes.lines:
+            form = (line.get_label(), line.get_color(), line.get_marker(), line.get_linestyle())
+            lines.append(f"line {form} {told(line.get_xydata())}")
+        paths = [patch.get_path() for patch in axes.patches]
+        paths += [path for some in axes.collections for path in some.get_paths()]
+        lines += [f"path {told(path.vertices)}" for path in paths]
+        for text in axes.texts:
+            place = np.round([*getattr(text, "xyann", ()), *text.get_position()], 2).tolist()
+            lines.append(f"text {text.get_text()} {place} {text.get_ha()} {text.get_va()}")
+    for text in figure.texts:
+        lines.append(f"text {text.get_text()} {np.round(text.get_position(), 3).tolist()}")
+    for legend in (*figure.legends, *(axes.get_legend() for axes in figure.axes)):
+        if legend is not None:
+            lines.append(f"legend {legend._ncols} {[one.get_text() for one in legend.get_texts()]}")
+    return "\n".join(lines)
 
 
 def _digest(text: str) -> str:

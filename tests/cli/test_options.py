@@ -13,12 +13,14 @@ from functools import cache
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import openpyxl
 import pytest
+from matplotlib.figure import Figure
 
 from tests.cli.option_table import READING, TABLE, TABLES
-from tests.cli.outcomes import are_alike, changes, kept, shortened
+from tests.cli.outcomes import are_alike, changes, drawn, kept, shortened
 from tests.cli.walk import WALK, commands
 from tests.reference.small_plate import PLATE
 from tests.robustness.kit import POOL, make_kit
@@ -136,7 +138,8 @@ def written(line: str, kit: Path) -> str:
     if not folder.exists():
         shutil.copytree(kit, folder)
     before = stamps(folder)
-    status, out, err = outcome(shlex.split(line), folder)
+    with patch.object(Figure, "savefig", lambda self, to, **_: to.write(drawn(self).encode())):
+        status, out, err = outcome(shlex.split(line), folder)
     parts, after = [f"status {status}", out, err], stamps(folder)
     changed = (path for path in after if after[path] != before.get(path))
     # Whether a lock is left is chance.
