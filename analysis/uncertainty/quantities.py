@@ -32,16 +32,16 @@ QUANTITIES: dict[str, QuantityKind] = KERNEL_QUANTITIES | {
 def functions_of(symbol: str, design: Design, layout: SharedLayout) -> tuple[Functions, ...]:
     """Return the functions of a quantity, empty in a design without it.
 
-    :raises ValueError: the entry is inconsistent.
+    :raises UnusableError: the entry is inconsistent, or what its function returns.
     """
     kind = QUANTITIES[symbol]
     try:
         functions = kind.functions(design, layout)
     except ValueError as error:
-        raise ValueError(f"quantity {symbol}: {error}") from error
+        raise UnusableError(f"quantity {symbol}: {error}") from error
     fault = _fault_of(kind, functions)
     if fault:
-        raise ValueError(f"quantity {symbol}: {fault}")
+        raise UnusableError(f"quantity {symbol}: {fault}")
     return functions
 
 
