@@ -102,6 +102,7 @@ TABLE: tuple[tuple[str, str, str], ...] = (
     ("reach pair.yaml --by repeatability", "--variant coarse", "pair[coarse]"),
     ("reach plate.yaml", "--by repeats", "without: machine's repeatability"),
     (f"reach {PLATE}", "--goal 'U6 average 0.5 um'", "goal: average U6 at most 0.5 µm"),
+    ("reach plate.yaml --by certificate", "--calibration 3", "the indices are 0 to 0"),
     (f"reach {PLATE}", "--share 50%", "50 % of lengths within"),
     (f"reach {PLATE}", "--target '1 um'", "at most 0.755 um"),
     ("reach tables.yaml --by certificate", "--artefact bar", "without: and 1 more"),

@@ -303,6 +303,18 @@ def test_several_probes_and_priors() -> None:
     refused(experiment, readings, told)
     one = bp.fit(experiment, readings[readings.probe == "a"], **AS_REVERSAL)
     assert one.to_dict()["estimates"]["alpha"]["value"] == pytest.approx(12e-6, abs=2e-6)
+    # What takes places of balls in the one position, less its origin, to those in the other.
+    exact = bp.simulate(experiment, exact=True).query("probe == 'b'")
+    shifted = bp.fit(experiment, exact, **AS_REVERSAL).to_dict()
+    origins = {one.name: one.pose.origin - [0.02, 0.0] for one in experiment.positions}
+    to, of = (
+        exact.query("position == @name")[["x_mm", "y_mm"]].to_numpy() / 1e3 - origins[name]
+        for name in (shifted["positions"]["first"], shifted["positions"]["second"])
+    )
+    offset = np.linalg.lstsq(np.c_[of, np.ones(len(of))], to, rcond=None)[0][2]
+    for axis, value in zip("xy", offset.tolist(), strict=True):
+        estimate = shifted["multiple_redundancy"]["relation"][f"offset {axis}"]
+        assert estimate["value"] == pytest.approx(value, abs=1e-9)
     prior = [{"parameter": "gamma", "standard_uncertainty": "1 ppm"}]
     known = bp.load(ANGLES, "quarter turn").with_({"priors": prior})
     readings = bp.simulate(known)

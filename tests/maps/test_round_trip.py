@@ -40,19 +40,8 @@ def test_a_map_is_read_as_it_was_written(kind: str, folder: Path) -> None:
     assert again.volume.corners == fitted.volume.corners
     assert again.parameters == fitted.parameters
     for attribute in [
-        "title",
-        "sigma",
-        "sigma_is_estimated",
-        "degrees_of_freedom",
-        "coverage_factor",
-        "frame",
-        "temperatures",
-        "left_out",
-        "data",
-        "experiment",
-        "program",
-        "date",
-        "probe",
+        *("title", "sigma", "sigma_is_estimated", "degrees_of_freedom", "coverage_factor"),
+        *("frame", "temperatures", "left_out", "data", "experiment", "program", "date", "probe"),
     ]:
         assert getattr(again, attribute) == getattr(fitted, attribute), attribute
     before = path.read_bytes()

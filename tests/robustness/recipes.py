@@ -57,6 +57,8 @@ RECIPES = (
         "fit dummy.yaml dummy-readings.csv --variant 'with scale' --estimator reversal --scale x"
         " --no-offsets"
     ),
+    "fit dummy.yaml dummy-readings.csv --variant 'with scale'",
+    "reach angles.yaml --variant 'any angles' --by balls --goal 'U6 average 1 um'",
     "fit angles.yaml angles-readings.csv --variant 'any angles' --plot out.svg",
     "certificate small.yaml small-readings.csv --sigma given -o out.html",
     (

@@ -81,20 +81,8 @@ def pcdmis(balls: Sequence[Ball], unit: str = "MM", factor: str = "1", newer: bo
 
 
 CHARACTERISTICS = [
-    "planid",
-    "partnb",
-    "id",
-    "type",
-    "idsymbol",
-    "actual",
-    "nominal",
-    "uppertol",
-    "lowertol",
-    "deviation",
-    "exceed",
-    "featureid",
-    "unit",
-    "group1",
+    *("planid", "partnb", "id", "type", "idsymbol", "actual", "nominal", "uppertol", "lowertol"),
+    *("deviation", "exceed", "featureid", "unit", "group1"),
 ]
 
 
