@@ -157,7 +157,11 @@ def entry_names(node: Node) -> list[str] | None:
 
 
 def subset_count(total: int, fixed: int, sizes: tuple[int, ...]) -> int:
-    """Return the number of subsets of `total` entries that include `fixed` given ones."""
+    """Return the number of subsets of `total` entries that include `fixed` given ones.
+
+    >>> subset_count(5, 2, (3,)), len(subsets([*"abcde"], ("a", "b"), tuple("abcde"), (3,)))
+    (3, 3)
+    """
     return sum(math.comb(total - fixed, size - fixed) for size in sizes if fixed <= size <= total)
 
 

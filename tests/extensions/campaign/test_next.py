@@ -70,6 +70,18 @@ def test_the_next_position_is_the_best_of_all(readings: pandas.DataFrame) -> Non
         assert one.average == pytest.approx(every[one.name], rel=1e-9)
 
 
+def test_of_many_only_the_first_by_fewer_points_are_judged(
+    readings: pandas.DataFrame, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    every = judged(of(readings, *NAMES[:3]))
+    few = {"MOST_OFFERED": 1, "RANKED_BY": 150, "KEPT": 2}
+    for name, value in few.items():
+        monkeypatch.setattr(f"ballplate.extensions.campaign.next_position.{name}", value)
+    kept = judged(of(readings, *NAMES[:3])).offered
+    assert [one.name for one in kept] == [one.name for one in every.offered[:2]]
+    assert [one.average for one in kept] == [one.average for one in every.offered[:2]]
+
+
 def test_what_was_promised_is_reached(readings: pandas.DataFrame) -> None:
     before = judged(of(readings, *NAMES[:5]))
     assert not before.is_met and before.next is not None and before.next.name == "y high"
