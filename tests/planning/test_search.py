@@ -117,7 +117,7 @@ def tried(examples: int) -> settings:
     )
 
 
-@pytest.mark.parametrize("name", ["U6", "E"])
+@pytest.mark.parametrize("name", ["U6", pytest.param("E", marks=pytest.mark.long)])
 @tried(2)
 @given(limited=limits())
 def test_the_best_or_near_it_and_never_below_the_bound(

@@ -43,7 +43,6 @@ LINES = (
 COMMANDS = (
     "plan pool.yaml --hours 2 --curve --workers 2",
     "sweep own.yaml --workers 2",
-    "run own-model.yaml --trials 600 --workers 2",
 )
 # Every command, one after the other in one process: what any of them loads shows.
 ALL = """
