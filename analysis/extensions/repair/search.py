@@ -40,8 +40,8 @@ WORTHWHILE = 0.95
 MOST_JUDGED = 8
 # Evaluation points of the search, and along each axis where the file has none.
 MOST_POINTS, NODES = 200, 3
-# Digits to which criteria and efforts are compared.
-COMPARED = 33
+# Binary digits to which criteria, which lose some by the ridge, and efforts are compared.
+COMPARED = 24
 
 # Information below this fraction of that of the whole pool, and U6 of deficient designs, in metres.
 UNDETERMINED, LARGE = 1e-10, 1e9
@@ -194,7 +194,10 @@ def best_set(
             for members in level
             for k in _extensions(pool, members, allowed, losses, least)
         }
-        order = sorted(larger, key=lambda members: (losses.of(members), sorted(members)))
+        # Of those alike but for rounding the first.
+        order = sorted(
+            larger, key=lambda one: (float(comparable(losses.of(one), COMPARED)), sorted(one))
+        )
         if not order:
             break
         best_by_effort: dict[float, Members] = {}

@@ -127,7 +127,8 @@ def _placement(experiment: Experiment, position: Position) -> dict[str, Any]:
         }
     plane, turns = plane_axis
     normal = AXIS_INDEX[plane]
-    lower = ball_coordinates(pose, layout).min(axis=0)
+    # Without what rounding leaves.
+    lower = np.round(ball_coordinates(pose, layout).min(axis=0), 13) + 0.0
     settings: dict[str, Any] = (
         {} if d == 2 else {"plane": plane, "level": written_length(pose.origin[normal])}
     )
