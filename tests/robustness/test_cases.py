@@ -28,7 +28,7 @@ from tests.robustness.worker import Worker
 
 # Where a test ends, as the next may fail for the same reason.
 ENOUGH = 10
-FEW, MANY = range(len(RECIPES)), range(20_000)
+FEW, MANY = range(0, len(RECIPES), 2), range(20_000)
 
 
 @pytest.fixture(scope="module")
@@ -163,7 +163,7 @@ def test_bounds_of_time_and_memory_hold() -> None:
 
 
 def test_some_cases(kit: Path, tmp_path: Path, record_property: Callable[..., None]) -> None:
-    """Each recipe with a change."""
+    """Every other recipe with a change."""
     outcomes = Outcomes()
     found = faults(kit, tmp_path / "cases", (case(kit, number) for number in FEW), outcomes)
     assert not found, "\n\n".join(found)
