@@ -47,10 +47,9 @@ def sweep(
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     path = f"{folder}/plates.sqlite"
-    ...     sweep("designs/sweeps/plate-size.yaml", path)
-    ...     len(stored(path).to_frame())
-    <SweepResult of plate-size: 12 cases, 12 done, 0 failed>
-    12
+    ...     computed = sweep("designs/sweeps/plate-size.yaml", path)
+    ...     computed, stored(path).to_frame().equals(computed.to_frame())
+    (<SweepResult of plate-size: 12 cases, 12 done, 0 failed>, True)
     """
     from .load import load_sweep
     from .running import computed
