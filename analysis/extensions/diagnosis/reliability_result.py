@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from ballplate.presentation import (
@@ -28,9 +27,6 @@ from ballplate.uncertainty import QUANTITIES
 from .bias_patterns import DRIFTS, Patterns, single_kinds
 from .effects import MOST_PLACES, across_probes
 from .names import name
-
-if TYPE_CHECKING:
-    pass
 
 # Effects below this share of the bias, in metres per unit, are neglected.
 NO_EFFECT = 1e-6

@@ -39,7 +39,7 @@ from .changes import (
     middle_of,
     scale_readings,
 )
-from .written import plane_of
+from .written import cleaned, plane_of
 
 PLANES: tuple[Axis, ...] = ("x", "y", "z")
 AXES = "xyz"
@@ -269,7 +269,7 @@ def _plate_poses(experiment: Experiment, artefact: str) -> Iterator[tuple[str, A
                 normal = AXIS_INDEX[plane]
                 origin[normal] = volume.lower[normal] + level * volume.size[normal]
                 words = f"in plane {plane} at {format_length(origin[normal])}, {words}"
-            pose = Pose(rotation, _clean(origin - rotation @ middle))
+            pose = Pose(rotation, cleaned(origin - rotation @ middle))
             yield words, plane if d == 3 else None, pose
 
 
@@ -355,11 +355,6 @@ def pitch(layout: BallLayout) -> float:
         gap = np.diff(np.unique(np.round(layout.coordinates[:, axis], 9)))
         gaps += gap[gap > 1e-6].tolist()
     return float(np.round(np.median(gaps), 4)) if gaps else 0.1
-
-
-def _clean(origin: Array) -> Array:
-    """Return an origin without what rounding leaves."""
-    return np.round(origin, 13) + 0.0
 
 
 def _is_plate(experiment: Experiment, artefact: str) -> bool:

@@ -127,8 +127,7 @@ def _placement(experiment: Experiment, position: Position) -> dict[str, Any]:
         }
     plane, turns = plane_axis
     normal = AXIS_INDEX[plane]
-    # Without what rounding leaves.
-    lower = np.round(ball_coordinates(pose, layout).min(axis=0), 13) + 0.0
+    lower = cleaned(ball_coordinates(pose, layout).min(axis=0))
     settings: dict[str, Any] = (
         {} if d == 2 else {"plane": plane, "level": written_length(pose.origin[normal])}
     )
@@ -136,6 +135,11 @@ def _placement(experiment: Experiment, position: Position) -> dict[str, Any]:
         axis: written_length(lower[AXIS_INDEX[axis]]) for axis in IN_PLANE_AXES[plane]
     }
     return settings | ({"quarter_turns": turns} if turns else {})
+
+
+def cleaned(place: Array) -> Array:
+    """Return a place (d,) in metres without what rounding leaves."""
+    return np.round(place, 13) + 0.0
 
 
 def plane_of(rotation: Array) -> tuple[Any, int] | None:
