@@ -6,6 +6,8 @@ The outcome is the status, both outputs, and the files written; the folder is th
 
 from __future__ import annotations
 
+from tests.robustness.recipes import DUMMY
+
 FIT = "plate.yaml plate.csv"
 SHEET = {
     "--machine-type": "'fixed bridge'",
@@ -239,4 +241,55 @@ TABLES = (
     ("blank.csv", "--fill-down"),
     ("two.xlsx", "--sheet taken"),
     ("swapped.csv", "--swap-names"),
+)
+
+# What is kept of the files of the folder `files`; readings in `wrong.csv` and `wrong-small.csv` have
+# a gross error, those in `off.csv` errors that the model has not.
+EFFECTS = "effects.yaml effects.csv"
+LIMITED = "plan limited.yaml --workers 1"
+LINES = (
+    "run effects.yaml --trials 4 --seed 2 --workers 1 --json",
+    "run effects.yaml --assumptions --report out.html",
+    *(f"{name} effects.yaml" for name in ("'run --budget'", "'run --reliability'", "sheet")),
+    "'run --errors' effects.yaml",
+    "reach effects.yaml --by thermometers --target '0.5 um'",
+    f"fit {EFFECTS} --report out.html -o new.yaml --plot out.svg",
+    f"fit {EFFECTS} --monomials --json",
+    f"validate {EFFECTS}",
+    f"certificate {EFFECTS} -o out.html",
+    f"next {EFFECTS} --json",
+    "fit effects.yaml wrong.csv --report out.html",
+    f"{LIMITED} --positions 5 --curve --sheet out.html --plot out.svg -o out.yaml",
+    f"{LIMITED} --positions 3 --criterion A --json",
+    "next limited-plan.yaml begun-limited.csv",
+    "check lost.yaml --json",
+    "fit lost.yaml lost.csv --report out.html",
+    "'run --errors' lost.yaml",
+    "'run --reliability' lost.yaml",
+    "compare pair.yaml --trials 2 --points 5",
+    "run plate.yaml --trials 5 --workers 1 --json",
+    "fit small.yaml off.csv --report out.html --plot out.svg",
+    "validate small.yaml off.csv --json",
+    "fit small.yaml wrong-small.csv --report out.html",
+    "fit small.yaml wrong-small.csv --json",
+    "fit tables.yaml tables-again.csv --report out.html",
+    "diff tables.yaml tables.yaml --readings tables-readings.csv tables-again.csv --grid 2",
+    *("check mistakes.yaml", "check references.yaml", "map mistaken-machine.yaml"),
+    *("sweep mistaken-sweep.yaml --dry-run", "fit small.yaml mistaken.csv"),
+    "correct map.yaml mistaken.csv",
+    *(f"fit {DUMMY} --estimator reversal{more}" for more in (" --json", "", " --plot out.svg")),
+    "compare dummy.yaml --variant 'with scale' --estimator reversal --trials 3 --points 5 --json",
+    "fit small.yaml small-again.csv --estimator kruth --json",
+    "fit small.yaml small-again.csv --estimator cresto --pairs all --monomials",
+    "compare small.yaml --trials 2 --points 5 --estimator kruth --json",
+    "run tables.yaml --trials 4 --workers 1 --seed 3 --json",
+    *(
+        "run certified/weak.yaml --json",
+        "check certified/weak.yaml",
+        "run certified/deficient.yaml",
+    ),
+    "'run --budget' effects.yaml effects.csv --by position --json",
+    *("map gec-like.yaml --budget --grid 2,2,2", "'map --curves' gec-like.yaml --json"),
+    "init out.yaml --machine-type 'horizontal arm' --volume '1 x 2.5 x 1.5 m' --mpe '15 um + L/100'"
+    " --plate '5 x 5, 600 mm' --certificate '1 um' --hours 6",
 )

@@ -19,7 +19,7 @@ import openpyxl
 import pytest
 from matplotlib.figure import Figure
 
-from tests.cli.option_table import READING, TABLE, TABLES
+from tests.cli.option_table import LIMITED, LINES, READING, TABLE, TABLES
 from tests.cli.outcomes import are_alike, changes, drawn, kept, shortened
 from tests.cli.walk import WALK, commands
 from tests.reference.small_plate import PLATE
@@ -37,6 +37,7 @@ SECOND = (
     .replace("plane: x", "plane: x, artefact: plate")
     .replace("[{kind: dist", "[{artefact: plate, kind: dist")
 )
+FILES = Path(__file__).parent / "files"
 OFFSETS = {"down": (0.0, 0.0, -50.0), "right": (60.0, 0.0, 0.0)}
 # Progress bars are all that they print beside their results, and only on a terminal.
 SILENT = (
@@ -85,8 +86,16 @@ def filled(folder: Path) -> Path:
     outcome([*simulate, "plate.csv", "--seed", "5", *certificate], folder)
     outcome([*simulate, "plate-again.csv", "--seed", "6"], folder)
     outcome(["simulate", "plates.yaml", "-o", "plates.csv"], folder)
-    begun = (folder / "planned-readings.csv").read_text(encoding="utf-8").splitlines(True)[:7]
-    (folder / "begun.csv").write_text("".join(begun), encoding="utf-8")
+    shutil.copytree(FILES, folder, dirs_exist_ok=True)
+    outcome(f"{LIMITED} --positions 5 -o limited-plan.yaml".split(), folder)
+    for name in ("effects", "lost", "limited-plan"):
+        outcome(["simulate", f"{name}.yaml", "-o", f"{name}.csv"], folder)
+    for name, source, rows in (
+        ("begun", "planned-readings", 7),
+        ("begun-limited", "limited-plan", 20),
+    ):
+        lines = (folder / f"{source}.csv").read_text(encoding="utf-8").splitlines(True)[:rows]
+        (folder / f"{name}.csv").write_text("".join(lines), encoding="utf-8")
     _write_tables(folder)
     return folder
 
@@ -210,7 +219,7 @@ def outcomes(line: str, option: str, kit: Path) -> dict[str, list[str]]:
 
 
 def every_outcome(kit: Path) -> dict[str, list[str]]:
-    return {line: lines_of(line, kit) for line in RECIPES} | {
+    return {line: lines_of(line, kit) for line in (*RECIPES, *LINES)} | {
         name: lines
         for line, option, _ in (getattr(row, "values", row) for row in ALL)
         for name, lines in outcomes(line, option, kit).items()
@@ -234,7 +243,7 @@ def ensure_kept(name: str, lines: list[str]) -> None:
         assert are_alike(found, was), name
 
 
-@pytest.mark.parametrize("line", RECIPES)
+@pytest.mark.parametrize("line", (*RECIPES, *LINES))
 def test_recipe(line: str, kit: Path) -> None:
     ensure_kept(line, lines_of(line, kit))
 

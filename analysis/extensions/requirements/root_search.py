@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 from ballplate.results import PlannedUncertainty, Prediction, planned_uncertainty, predict
 from ballplate.simulator.computing import Report, comparable, counted, single_threaded, unreported
-from ballplate.simulator.experiment import Experiment, override, unspanned
+from ballplate.simulator.experiment import Experiment, override, placed_only, unspanned
 from ballplate.simulator.inputs import ExperimentError, Mapping, Node, Scalar, listing, refused
 
 from .answers import Answer, Reach, Status
@@ -86,7 +86,9 @@ def reach(
         root = override(root, "true_machine", zero, root.mark)
     if target is not None:
         root = override(root, "target_uncertainty", Scalar(root.mark, target), root.mark)
-    searched = _Searched(root, experiment.builder, goal)
+    # A pool may have artefacts that no position of the file has.
+    built, experiment = experiment.builder, placed_only(experiment)
+    searched = _Searched(root, lambda tree: placed_only(built(tree)), goal)
     present = searched.uncertainty(root)
     check_goal(goal, present)
     judged = judge(goal, present)
@@ -94,7 +96,7 @@ def reach(
     for name in counted(names, "unknowns", len(names), report):
         try:
             if name == "hours":
-                answers.append(hours_answer(searched.built(root), goal))
+                answers.append(hours_answer(built(root), goal))
                 continue
             sought = unknown(name, experiment, root, artefact, calibration)
         except NotVariableError as error:

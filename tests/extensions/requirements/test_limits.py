@@ -139,10 +139,14 @@ def test_a_narrow_range_of_sizes_is_found(place: int) -> None:
 
 
 def test_the_hours_are_those_of_the_shortest_plan(tmp_path: Path) -> None:
+    """Of a pool with a rod, which the file's position does not have."""
     path = tmp_path / "pool.yaml"
     drawn = "{name: p, plane: z, level: 50 mm, corner: {x: 0 mm, y: 0 mm}, probes: [down]}"
     drawn = drawn.replace("name: p", "name: p, artefact: plate")
     few = TEXT.replace("[0 mm, 300 mm]", "0 mm").replace("[0 mm, 200 mm]", "0 mm")
+    few = few.replace("artefacts:", "artefacts:\n  rod: {kind: two_spheres, length: 90 mm}")
+    rod = drawn.replace("name: p, artefact: plate", "name: rod, artefact: rod")
+    few = few.replace("candidates:", f"candidates:\n    - {rod}")
     path.write_text(f"{few}\npositions:\n  - {drawn}\n", encoding="utf-8")
     (experiment,) = load(path, planning=True)
     best = bp.plan(experiment, hours=3.0).prediction.quantities["U6"].average
