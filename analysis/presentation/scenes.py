@@ -153,8 +153,8 @@ def _axes(lower: Array, upper: Array, view: Array) -> tuple[tuple[str, Array, fl
 
 
 def hull(points: Array) -> Array:
-    """Return the corners of the convex hull of points (n, 2) counter-clockwise; of collinear
-    points, the ends.
+    """Return the corners of the convex hull of points (n, 2), in metres to 1 nm, counter-clockwise;
+    of collinear points, the ends.
 
     >>> hull(np.array([[0.0, 0.0], [1.0, 1.0], [0.5, 0.5]])).tolist()
     [[0.0, 0.0], [1.0, 1.0]]
@@ -162,7 +162,8 @@ def hull(points: Array) -> Array:
     # Imported late: it loads slowly, and `check` must start fast.
     from scipy.spatial import ConvexHull, QhullError
 
-    ordered = np.unique(points, axis=0)
+    # So that the corners do not depend on rounding.
+    ordered = np.unique(np.round(points, 9), axis=0)
     try:
         corners = ordered[ConvexHull(ordered).vertices] if len(ordered) > 2 else ordered
     except QhullError:

@@ -22,8 +22,9 @@ NUMBER = re.compile(r"(?<![#0-9a-f.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 NOTHING = re.compile(r"\de-(09|[1-9]\d)\b")
 # Parts that are longer, as pages and drawings, are kept by what their numbers and words come to.
 LONGEST = 6_000
-# Today, and what a last digit changes altogether.
+# Today, and what a last digit changes altogether, as how many steps were computed.
 CHANGING = (
+    r'\{\s*"step": [^}]*\},?|'
     r"\d{4}-\d\d-\d\d \d\d:\d\d UTC|(?<![.\w])[0-9a-f]{12,}\b|"
     r"openblas [^<]*|about [0-9.]+ (s|min)"
 )
@@ -76,10 +77,10 @@ def drawn(figure: Any) -> str:
 
 def _digest(text: str) -> str:
     """What the words of a page, a table or a drawing, or the keys of data, and all numbers come to;
-    the sum of logarithms notices a change of each. Less than 1e-13 may be nothing but rounding.
+    the sum of logarithms notices a change of each. Less than 1e-10 may be nothing but rounding.
     """
     numbers = np.abs([float(one) for one in NUMBER.findall(text)])
-    sizes = np.log10(1e13 * numbers[numbers > 1e-13])
+    sizes = np.log10(1e10 * numbers[numbers > 1e-10])
     words = " ".join(sorted({*re.findall(r'"[^"]*":', text)}) or NUMBER.sub("#", text).split())
     return f"... words {crc32(words.encode()) % 10**8:08d}, numbers {sizes.sum():.2f}"
 

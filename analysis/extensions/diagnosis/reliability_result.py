@@ -305,9 +305,14 @@ def _effect(result: Reliability, symbol: str) -> np.ndarray:
     """
     effects = result.effects[symbol]
     is_defined = np.isfinite(result.minimal_detectable) & (effects.first >= 0)
-    change = np.where(effects.change > NOTHING * result.sizes, effects.change, 0.0)
+    change = np.where(_has_effect(result, symbol), effects.change, 0.0)
     with np.errstate(invalid="ignore"):
         return np.where(is_defined, result.minimal_detectable * change, np.nan)
+
+
+def _has_effect(result: Reliability, symbol: str) -> np.ndarray:
+    """Return which biases (k,) have an effect that is more than rounding."""
+    return result.effects[symbol].change > NOTHING * result.sizes
 
 
 def _finite_or_zero(values: np.ndarray) -> np.ndarray:
@@ -416,13 +421,14 @@ def _location(result: Reliability, symbol: str, k: int) -> str:
     """Return the points of the largest effect."""
     effects, design = result.effects[symbol], result.design
     first, second = int(effects.first[k]), int(effects.second[k])
-    if first < 0 or result.effects[symbol].change[k] <= NOTHING * result.sizes[k]:
+    if first < 0 or not _has_effect(result, symbol)[k]:
         return ""
     return function_name(design, effects.functions[0], first, second)
 
 
 def _pattern_data(result: Reliability, k: int) -> Data:
     hidden = math.isinf(result.minimal_detectable[k])
+    has_effect = {symbol: _has_effect(result, symbol)[k] for symbol in result.effects}
     return {
         "name": name(result.patterns, k),
         "kind": str(result.patterns.kind[k]),
@@ -435,8 +441,13 @@ def _pattern_data(result: Reliability, k: int) -> Data:
                 "per_unit" if hidden else "change": float(
                     result.effects[symbol].change[k]
                     * (1.0 if hidden else result.minimal_detectable[k])
+                    if has_effect[symbol]
+                    else 0.0
                 ),
-                "standard_uncertainty": result.effects[symbol].uncertainty[k],
+                # That of the function with the largest change, which rounding would choose.
+                "standard_uncertainty": result.effects[symbol].uncertainty[k]
+                if has_effect[symbol]
+                else None,
                 "at": _location(result, symbol, k),
             }
             for symbol in result.effects

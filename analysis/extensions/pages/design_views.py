@@ -129,11 +129,7 @@ def _outline(points: Array) -> Array:
     centre = points.mean(axis=0)
     _, _, axes = svd(points - centre, full_matrices=False)
     plane = axes[:2]
-    corners = (
-        hull(np.round((points - centre) @ plane.T, 9))
-        if len(points) > 1
-        else np.zeros((1, len(plane)))
-    )
+    corners = hull((points - centre) @ plane.T) if len(points) > 1 else np.zeros((1, len(plane)))
     return centre + corners @ plane[: corners.shape[1]]
 
 
