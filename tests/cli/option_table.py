@@ -256,7 +256,7 @@ LINES = (
     f"fit {EFFECTS} --report out.html -o new.yaml --plot out.svg",
     f"fit {EFFECTS} --monomials --json",
     f"validate {EFFECTS}",
-    f"certificate {EFFECTS} -o out.html",
+    f"certificate {EFFECTS} --plate plate -o out.html",
     f"next {EFFECTS} --json",
     "fit effects.yaml wrong.csv --report out.html",
     f"{LIMITED} --positions 5 --curve --sheet out.html --plot out.svg -o out.yaml",
@@ -286,6 +286,7 @@ LINES = (
     *(
         "run certified/weak.yaml --json",
         "check certified/weak.yaml",
+        "fit certified/weak.yaml certified/weak.csv --report out.html",
         "run certified/deficient.yaml",
     ),
     "'run --budget' effects.yaml effects.csv --by position --json",

@@ -88,7 +88,7 @@ def filled(folder: Path) -> Path:
     outcome(["simulate", "plates.yaml", "-o", "plates.csv"], folder)
     shutil.copytree(FILES, folder, dirs_exist_ok=True)
     outcome(f"{LIMITED} --positions 5 -o limited-plan.yaml".split(), folder)
-    for name in ("effects", "lost", "limited-plan"):
+    for name in ("effects", "lost", "limited-plan", "certified/weak"):
         outcome(["simulate", f"{name}.yaml", "-o", f"{name}.csv"], folder)
     for name, source, rows in (
         ("begun", "planned-readings", 7),

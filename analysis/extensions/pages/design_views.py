@@ -125,12 +125,19 @@ def _edges(outline: Array, thickness: float) -> Layer:
 
 
 def _outline(points: Array) -> Array:
-    """Corners (k, d) of points' convex hull in the plane that they are closest to."""
+    """Corners (k, d) of points' convex hull in the plane that they are closest to, the lowest along
+    x first.
+    """
     centre = points.mean(axis=0)
     _, _, axes = svd(points - centre, full_matrices=False)
     plane = axes[:2]
     corners = hull((points - centre) @ plane.T) if len(points) > 1 else np.zeros((1, len(plane)))
-    return centre + corners @ plane[: corners.shape[1]]
+    outline = centre + corners @ plane[: corners.shape[1]]
+    # Rounding decides where the hull begins, and which side of the plane is seen.
+    order = [tuple(corner) for corner in np.round(outline, 9).tolist()]
+    turned = np.roll(outline, -order.index(min(order)), axis=0)
+    second, last = (tuple(np.round(turned[k], 9).tolist()) for k in (1 % len(turned), -1))
+    return turned if second <= last else np.roll(turned[::-1], 1, axis=0)
 
 
 def _some(balls: Integers) -> Integers:
