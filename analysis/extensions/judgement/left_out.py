@@ -15,7 +15,13 @@ from typing import Literal
 import numpy as np
 from ballplate.extensions.diagnosis.hat import hat_rows, row_count, row_places, whitened_residuals
 from ballplate.results import campaign_sigmas
-from ballplate.simulator.computing import ProgressStep, Report, single_threaded, unreported
+from ballplate.simulator.computing import (
+    ProgressStep,
+    Report,
+    comparable,
+    single_threaded,
+    unreported,
+)
 from ballplate.simulator.design import (
     Design,
     Flags,
@@ -207,7 +213,7 @@ def _worst(
         return None
     deviations = np.sqrt(np.where(can, fit_of_rest.variances, 1.0))
     standardised = np.where(can, fit_of_rest.errors / deviations, 0.0) / scale
-    worst = int(np.abs(standardised).argmax())
+    worst = int(comparable(np.abs(standardised)).argmax())
     reading, axis = divmod(int(fit_of_rest.rows[worst]), design.dimension)
     k = int(design.plate_readings[reading])
     uncertainties = reading_uncertainties(observed.design, observed.design.readings)[k, axis]
@@ -254,7 +260,7 @@ def _length_difference(
     if not is_known.any():
         return None
     change = np.where(is_known, length_of_rest - length_of_full, 0.0)
-    k = int(np.abs(change).argmax())
+    k = int(comparable(np.abs(change)).argmax())
     variance = max(float(u_rest[k] ** 2 - u_full[k] ** 2), 0.0)
     return LengthDifference(
         float(change[k]),
