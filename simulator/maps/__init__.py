@@ -10,6 +10,7 @@ from ballplate.simulator.inputs.faces import lazily
 if TYPE_CHECKING:
     from .fit_verdict import LackOfFit, verdict_data, verdict_line
     from .fitted_map import (
+        LEAST_SIGMA,
         FittedMap,
         InCommon,
         MapData,

@@ -41,6 +41,7 @@ from ballplate.simulator.experiment import Experiment
 from ballplate.simulator.geometry import AXIS_NAMES
 from ballplate.simulator.inputs import refused
 from ballplate.simulator.machines import Array, Integers
+from ballplate.simulator.maps import LEAST_SIGMA
 from ballplate.simulator.readings import ObservedReadings
 
 from .lack_of_fit import chance_of
@@ -182,14 +183,15 @@ def _left_out(
     if fit_of_rest is None:
         return PredictedPosition(name, 0, float("nan"), float("nan"), 1.0, False)
     predicted = freedom - fit_of_rest.degrees_of_freedom
-    square = max(full.factor.sum_of_squares - fit_of_rest.sum_of_squares, 0.0)
+    sum_left, freedom_left = fit_of_rest.sum_of_squares, fit_of_rest.degrees_of_freedom
+    square = max(full.factor.sum_of_squares - sum_left, 0.0)
     scale = 1.0
     if not is_given:
-        variance = fit_of_rest.sum_of_squares / max(fit_of_rest.degrees_of_freedom, 1)
-        scale = float(np.sqrt(variance)) if fit_of_rest.degrees_of_freedom > 0 else float("nan")
-    chance = chance_of(
-        square, predicted, fit_of_rest.sum_of_squares, fit_of_rest.degrees_of_freedom, is_given
-    )
+        # Ratios of what is nothing but rounding would differ from one processor to another.
+        square = square if square > LEAST_SIGMA**2 * predicted else 0.0
+        sum_left = sum_left if sum_left > LEAST_SIGMA**2 * freedom_left else 0.0
+        scale = float(np.sqrt(sum_left / freedom_left)) if freedom_left > 0 else float("nan")
+    chance = chance_of(square, predicted, sum_left, freedom_left, is_given)
     return PredictedPosition(
         name,
         predicted,
