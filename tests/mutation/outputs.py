@@ -1,7 +1,7 @@
 """What commands write with and without a change of the code, byte by byte.
 
 A change that the tests do not notice is equivalent only if nothing differs in what the commands of
-`tests.robustness`, and those below of the shipped designs, print and write, though they reach it.
+`tests.robustness` and `tests.cli`, and those below, print and write, though they reach it.
 """
 
 from __future__ import annotations
@@ -16,11 +16,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from tests.cli.option_table import LINES
+from tests.cli.test_options import filled
 from tests.mutation.forks import change, in_fork, probed
 from tests.mutation.mutants import Mutant
 from tests.reference.copies import copy_file, copy_tree
 from tests.reference.installed_extension import TOP
-from tests.robustness.kit import make_kit
 from tests.robustness.recipes import RECIPES
 from tests.robustness.worker import outcome
 
@@ -29,8 +30,6 @@ OTHERS = (
     "plan planning/plate-pool.yaml --positions 5 --workers 1 -o out.yaml --sheet out.html",
     "plan planning/plate-pool.yaml --hours 3 --curve --workers 1 --plot out.svg",
     "sheet planning/campaign.yaml -o out.html",
-    "reproduce certified --json",
-    "reproduce hurt-foss --json",
 )
 SECONDS = 120.0
 # Times of day and of the processor, which are other ones in each run, and lines of how far a long
@@ -53,15 +52,14 @@ def lines() -> list[str]:
     designs = [path for path in sorted((TOP / "designs").rglob("*.yaml"))]
     names = [path.relative_to(TOP / "designs").as_posix() for path in designs]
     of_designs = [form.format(shlex.quote(name)) for form in OF_DESIGNS for name in names]
-    return [*RECIPES, *of_designs, *OTHERS]
+    return [*RECIPES, *LINES, *of_designs, *OTHERS]
 
 
 def shown(every: Sequence[Mutant], progress: Callable[[str], None]) -> dict[str, Shown]:
     """Of each change what the commands do with it."""
     with tempfile.TemporaryDirectory() as top:
         kit = Path(top, "kit")
-        kit.mkdir()
-        make_kit(kit)
+        filled(kit)
         before = [
             in_fork(lambda line=line: _reaching(line, kit, every), SECONDS) for line in lines()
         ]
