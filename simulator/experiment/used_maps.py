@@ -175,7 +175,7 @@ def _is_same(
     if machine.dimension != fitted.dimension:
         add(steps, f"is of {fitted.dimension} axes, but machine.volume of {machine.dimension}")
         return False
-    remedy = "make them the same, or convert the map"
+    remedy = "make them the same"
     if not check_within(*fitted.volume.corners, machine, steps, references, remedy, is_same=True):
         return False
     model_parameters = [(parameter.name, parameter.unit) for parameter in model.parameters]

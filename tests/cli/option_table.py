@@ -292,5 +292,5 @@ LINES = (
     "'run --budget' effects.yaml effects.csv --by position --json",
     *("map gec-like.yaml --budget --grid 2,2,2", "'map --curves' gec-like.yaml --json"),
     "init out.yaml --machine-type 'horizontal arm' --volume '1 x 2.5 x 1.5 m' --mpe '15 um + L/100'"
-    " --plate '5 x 5, 600 mm' --certificate '1 um' --hours 6",
+    " --plate '5 x 5, 600 mm' --certificate '1 um, k=2' --hours 6",
 )

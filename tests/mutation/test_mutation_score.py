@@ -18,7 +18,6 @@ from ballplate.simulator.design.observations import calibration, radius
 
 from tests.mutation.forks import change, in_fork, probed
 from tests.mutation.mutants import KINDS, mutants, mutated, source_of
-from tests.mutation.outputs import lasting
 from tests.mutation.score import Outcome, summary
 from tests.reference.installed_extension import TOP
 
@@ -70,15 +69,6 @@ def test_a_summary_names_what_was_not_noticed() -> None:
         f"extensions: {of_ci}",
         "all rooms: 2 of 4 noticed, 1 of them since tests took too long, 1 not reached",
     ]
-
-
-def test_what_differs_in_each_run_is_no_difference_of_outputs() -> None:
-    quick = "made 2026-01-31 09:59\nrank 12 of 12, 0.3 s\n"
-    bar = "4/6 kinds of changes, 00:01 so far, 00:01 left, accurate to 1.5 %\n"
-    slow = f"{bar}made 2026-01-31 10:00\n{bar}rank 12 of 12, 12 s\n"
-    assert lasting(quick, "/tmp/a") == lasting(slow, "/tmp/a") != ""
-    assert lasting("in /tmp/a/out.html", "/tmp/a") == lasting("in /tmp/b/out.html", "/tmp/b")
-    assert lasting("rank 12", "/tmp/a") != lasting("rank 11", "/tmp/a")
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs os.fork, which is missing here")

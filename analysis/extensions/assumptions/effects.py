@@ -100,7 +100,7 @@ class Assumptions(Result):
     def lines(self) -> list[str]:
         lines = [self.heading, *self._table(self.effects)]
         for name, reason in self.left_out:
-            lines.append(f"{name}: not computed, {reason}")
+            lines.append(f"{name}: not computed; {reason}")
         for effect in self.effects:
             assumption = effect.assumption
             lines += ["", f"{assumption.name}: {assumption.instead} ({assumption.source})"]
@@ -182,7 +182,8 @@ def assumption_effects(experiment: Experiment, lengths: Quantity) -> Assumptions
             quantity = found.get(assumption.name)
             effects.append(_effect(experiment, assumption, lengths, together, quantity))
         except ExperimentError as error:
-            left_out.append((assumption.name, error.messages[0].text))
+            first = error.messages[0]
+            left_out.append((assumption.name, ": ".join(filter(None, (first.path, first.text)))))
     # Undetermined distances cost more than any uncertainty.
     effects.sort(key=lambda effect: (effect.undetermined, effect.ratio), reverse=True)
     return Assumptions(
