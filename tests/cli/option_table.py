@@ -247,6 +247,9 @@ TABLES = (
 # a gross error, those in `off.csv` errors that the model has not.
 EFFECTS = "effects.yaml effects.csv"
 LIMITED = "plan limited.yaml --workers 1"
+REPORTS = ("dmis_inch.dmo", "dmis_points.dmo", "qif_3_0.qif", "pcdmis_inch.txt", "calypso_chr.txt")
+EXPORTS = ("axes-en.csv", "merged-en.csv", "programma-it.txt")
+READINGS = ("inches", "index", "part", "shuffled", "swapped")
 LINES = (
     "run effects.yaml --trials 4 --seed 2 --workers 1 --json",
     "run effects.yaml --assumptions --report out.html",
@@ -274,6 +277,9 @@ LINES = (
     "fit small.yaml wrong-small.csv --json",
     "fit tables.yaml tables-again.csv --report out.html",
     "diff tables.yaml tables.yaml --readings tables-readings.csv tables-again.csv --grid 2",
+    *(f"import samples/{name} --for samples/campaign.yaml -o -" for name in REPORTS),
+    *(f"fit exports/plate.yaml exports/{name}" for name in EXPORTS),
+    *(f"fit samples/campaign.yaml samples/{name}.csv" for name in READINGS),
     *("check mistakes.yaml", "check references.yaml", "map mistaken-machine.yaml"),
     *("sweep mistaken-sweep.yaml --dry-run", "fit small.yaml mistaken.csv"),
     "correct map.yaml mistaken.csv",
@@ -293,4 +299,28 @@ LINES = (
     *("map gec-like.yaml --budget --grid 2,2,2", "'map --curves' gec-like.yaml --json"),
     "init out.yaml --machine-type 'horizontal arm' --volume '1 x 2.5 x 1.5 m' --mpe '15 um + L/100'"
     " --plate '5 x 5, 600 mm' --certificate '1 um, k=2' --hours 6",
+)
+
+# Actions of the studio upon a design, and what its page then asks for.
+STUDIO = "studio: "
+ACTIONS = tuple(
+    f"{STUDIO}{line}"
+    for line in (
+        'small.yaml later {"do": "move", "position": "high", "by": [0.01, -0.02, 0.05]}',
+        'small.yaml matrix {"do": "turn", "position": "x low"}',
+        'small.yaml preview {"do": "stand", "position": "low", "across": "y"}',
+        'small.yaml drawn {"do": "copy", "position": "y low", "map": "points"}',
+        'lost.yaml drawn {"do": "put", "motion": 1, "map": "lengths"}',
+        'effects.yaml drawn {"do": "put", "like": "low", "at": [0.3, 0.2, 0.2], "map": "lengths"}',
+        'effects.yaml drawn {"do": "remove", "position": "high"}',
+        'effects.yaml later {"do": "off", "position": "y low"}',
+        'effects.yaml preview {"do": "probes", "position": "low", "probes": ["down", "right"]}',
+        'small.yaml preview {"do": "balls", "position": "low", "balls": ["r1c1", "r1c3", "r3c2"]}',
+        'small.yaml later {"do": "set", "path": ["machine", "volume", 2], "value": "350 mm"}',
+        'mistakes.yaml later {"do": "set", "path": ["seed"], "value": "2"}',
+        'references.yaml later {"do": "off", "position": "big"}',
+        'limited.yaml pool {"do": "fill", "probes": {"z": ["down"], "x": ["right"]}, "quarter_turns": [0, 1], "count": 2}',
+        'limited.yaml pool {"do": "forbid", "corner": ["low", "high", "low"]}',
+        'small.yaml later {"do": "fit"}',
+    )
 )

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import argparse
 import csv
+import json
 import shlex
 import shutil
 from collections.abc import Iterator
@@ -17,9 +18,15 @@ from unittest.mock import patch
 
 import openpyxl
 import pytest
+from ballplate.extensions.studio.actions import ActionError, done
+from ballplate.extensions.studio.document import opened
+from ballplate.extensions.studio.judging import VIEWS, judgement
+from ballplate.presentation import as_data
+from ballplate.simulator.computing import unreported
+from ballplate.simulator.inputs import ExperimentError
 from matplotlib.figure import Figure
 
-from tests.cli.option_table import LIMITED, LINES, READING, TABLE, TABLES
+from tests.cli.option_table import ACTIONS, LIMITED, LINES, READING, STUDIO, TABLE, TABLES
 from tests.cli.outcomes import are_alike, changes, drawn, kept, shortened
 from tests.cli.walk import WALK, commands
 from tests.reference.small_plate import PLATE
@@ -87,6 +94,8 @@ def filled(folder: Path) -> Path:
     outcome([*simulate, "plate-again.csv", "--seed", "6"], folder)
     outcome(["simulate", "plates.yaml", "-o", "plates.csv"], folder)
     shutil.copytree(FILES, folder, dirs_exist_ok=True)
+    for name in ("samples", "exports"):
+        shutil.copytree(FILES.parents[1] / "extensions" / "laboratory" / name, folder / name)
     outcome(f"{LIMITED} --positions 5 -o limited-plan.yaml".split(), folder)
     for name in ("effects", "lost", "limited-plan", "certified/weak"):
         outcome(["simulate", f"{name}.yaml", "-o", f"{name}.csv"], folder)
@@ -140,6 +149,23 @@ def stamps(folder: Path) -> dict[Path, tuple[int, int]]:
     return {path: (one.st_mtime_ns, one.st_ino) for path, one in found.items()}
 
 
+def run(line: str, folder: Path) -> tuple[int, str, str]:
+    return outcome(shlex.split(line), folder)
+
+
+def acted(line: str, folder: Path) -> tuple[int, str, str]:
+    """The text of a design after an action of the studio, its judgement, and a view of it."""
+    name, view, data = line.removeprefix(STUDIO).split(" ", 2)
+    action, document = json.loads(data), opened(folder / name)
+    try:
+        document = done(document, action)
+        shown = VIEWS[view](document, {**action, "revision": 0}, unreported)
+    except (ActionError, ExperimentError) as error:
+        shown = str(error)
+    told = json.dumps(as_data(judgement(document)), indent=1, default=str)
+    return 0, "\n".join([document.text, json.dumps(as_data(shown), indent=1)]), told
+
+
 @cache
 def written(line: str, kit: Path) -> str:
     """Status, outputs and files of a command in a copy of the kit, which is put right again."""
@@ -148,7 +174,7 @@ def written(line: str, kit: Path) -> str:
         shutil.copytree(kit, folder)
     before = stamps(folder)
     with patch.object(Figure, "savefig", lambda self, to, **_: to.write(drawn(self).encode())):
-        status, out, err = outcome(shlex.split(line), folder)
+        status, out, err = (acted if line.startswith(STUDIO) else run)(line, folder)
     parts, after = [f"status {status}", out, err], stamps(folder)
     changed = (path for path in after if after[path] != before.get(path))
     # Whether a lock is left is chance.
@@ -219,7 +245,7 @@ def outcomes(line: str, option: str, kit: Path) -> dict[str, list[str]]:
 
 
 def every_outcome(kit: Path) -> dict[str, list[str]]:
-    return {line: lines_of(line, kit) for line in (*RECIPES, *LINES)} | {
+    return {line: lines_of(line, kit) for line in (*RECIPES, *LINES, *ACTIONS)} | {
         name: lines
         for line, option, _ in (getattr(row, "values", row) for row in ALL)
         for name, lines in outcomes(line, option, kit).items()
@@ -243,7 +269,7 @@ def ensure_kept(name: str, lines: list[str]) -> None:
         assert are_alike(found, was), name
 
 
-@pytest.mark.parametrize("line", (*RECIPES, *LINES))
+@pytest.mark.parametrize("line", (*RECIPES, *LINES, *ACTIONS))
 def test_recipe(line: str, kit: Path) -> None:
     ensure_kept(line, lines_of(line, kit))
 

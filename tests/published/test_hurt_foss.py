@@ -121,6 +121,7 @@ def assert_unbiased(z: np.ndarray) -> None:
     assert np.abs(z.std(axis=0, ddof=1) - 1.0).max() < 4.0 / np.sqrt(2 * n)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("file", "variant"), CAMPAIGNS[:2])
 def test_the_joint_length_equations_are_unbiased_over_a_thousand_campaigns(
     file: str, variant: str

@@ -92,6 +92,7 @@ def test_what_a_file_states_is_the_data_sheet() -> None:
     assert experiment.layouts["plate"].names[-1] == "r6c6"
 
 
+@pytest.mark.long
 def test_a_plan_of_a_drafted_design_is_a_file(tmp_path: Path) -> None:
     """A design that was never written to a file has one nevertheless after its plan."""
     planned = bp.plan(bp.design(**FLAT), hours=2)

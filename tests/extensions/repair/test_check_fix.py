@@ -56,6 +56,7 @@ def deficiencies(path: Path) -> list[int]:
     return [check(one).verdict.deficiency for one in load(path)]
 
 
+@pytest.mark.long
 def test_deficient_variants_are_mended_and_the_others_left(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
