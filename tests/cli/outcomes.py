@@ -24,7 +24,7 @@ NOTHING = re.compile(r"\de-(09|[1-9]\d)\b")
 LONGEST = 6_000
 # Today, and what a last digit changes altogether, as how many steps were computed.
 CHANGING = (
-    r'\{\s*"step": [^}]*\},?|'
+    r'\{\s*"step": [^}]*\},?|"seconds": \d+\.\d{7,}|'
     r"\d{4}-\d\d-\d\d \d\d:\d\d UTC|(?<![.\w])[0-9a-f]{12,}\b|"
     r"openblas [^<]*|about [0-9.]+ (s|min)"
 )
