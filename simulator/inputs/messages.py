@@ -41,7 +41,12 @@ class Message:
 
     def __str__(self) -> str:
         location = f"{self.file}:{self.line}:{self.column}" if self.line else self.file
-        return in_one_line(": ".join(part for part in (location, self.path, self.text) if part))
+        return in_one_line(": ".join(filter(None, (location, self.text_with_path))))
+
+    @property
+    def text_with_path(self) -> str:
+        """The text behind the path, without the place in the file."""
+        return ": ".join(filter(None, (self.path, self.text)))
 
 
 class ExperimentError(Exception):

@@ -6,7 +6,7 @@ The outcome is the status, both outputs, and the files written; the folder is th
 
 from __future__ import annotations
 
-from tests.robustness.recipes import DUMMY
+from tests.robustness.recipes import DUMMY, RECIPES
 
 FIT = "plate.yaml plate.csv"
 SHEET = {
@@ -324,3 +324,5 @@ ACTIONS = tuple(
         'small.yaml later {"do": "fit"}',
     )
 )
+
+KEPT = (*RECIPES, *LINES, *ACTIONS)

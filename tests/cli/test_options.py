@@ -26,12 +26,11 @@ from ballplate.simulator.computing import unreported
 from ballplate.simulator.inputs import ExperimentError
 from matplotlib.figure import Figure
 
-from tests.cli.option_table import ACTIONS, LIMITED, LINES, READING, STUDIO, TABLE, TABLES
+from tests.cli.option_table import KEPT, LIMITED, READING, STUDIO, TABLE, TABLES
 from tests.cli.outcomes import are_alike, changes, drawn, kept, shortened
 from tests.cli.walk import WALK, commands
 from tests.reference.small_plate import PLATE
 from tests.robustness.kit import POOL, make_kit
-from tests.robustness.recipes import RECIPES
 from tests.robustness.worker import outcome
 
 VARIANTS = "variants: {plain: {}, coarse: {machine.repeatability: 1 um}}\n"
@@ -149,10 +148,6 @@ def stamps(folder: Path) -> dict[Path, tuple[int, int]]:
     return {path: (one.st_mtime_ns, one.st_ino) for path, one in found.items()}
 
 
-def run(line: str, folder: Path) -> tuple[int, str, str]:
-    return outcome(shlex.split(line), folder)
-
-
 def acted(line: str, folder: Path) -> tuple[int, str, str]:
     """The text of a design after an action of the studio, its judgement, and a view of it."""
     name, view, data = line.removeprefix(STUDIO).split(" ", 2)
@@ -174,7 +169,8 @@ def written(line: str, kit: Path) -> str:
         shutil.copytree(kit, folder)
     before = stamps(folder)
     with patch.object(Figure, "savefig", lambda self, to, **_: to.write(drawn(self).encode())):
-        status, out, err = (acted if line.startswith(STUDIO) else run)(line, folder)
+        of_studio = line.startswith(STUDIO)
+        status, out, err = acted(line, folder) if of_studio else outcome(shlex.split(line), folder)
     parts, after = [f"status {status}", out, err], stamps(folder)
     changed = (path for path in after if after[path] != before.get(path))
     # Whether a lock is left is chance.
@@ -245,7 +241,7 @@ def outcomes(line: str, option: str, kit: Path) -> dict[str, list[str]]:
 
 
 def every_outcome(kit: Path) -> dict[str, list[str]]:
-    return {line: lines_of(line, kit) for line in (*RECIPES, *LINES, *ACTIONS)} | {
+    return {line: lines_of(line, kit) for line in KEPT} | {
         name: lines
         for line, option, _ in (getattr(row, "values", row) for row in ALL)
         for name, lines in outcomes(line, option, kit).items()
@@ -269,7 +265,7 @@ def ensure_kept(name: str, lines: list[str]) -> None:
         assert are_alike(found, was), name
 
 
-@pytest.mark.parametrize("line", (*RECIPES, *LINES, *ACTIONS))
+@pytest.mark.parametrize("line", KEPT)
 def test_recipe(line: str, kit: Path) -> None:
     ensure_kept(line, lines_of(line, kit))
 

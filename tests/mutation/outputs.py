@@ -12,14 +12,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from tests.cli.option_table import LINES
+from tests.cli.option_table import KEPT
 from tests.cli.outcomes import are_alike
 from tests.cli.test_options import filled, lines_of, written
 from tests.mutation.forks import change, in_fork, probed
 from tests.mutation.mutants import Mutant
 from tests.reference.copies import copy_tree
 from tests.reference.installed_extension import TOP
-from tests.robustness.recipes import RECIPES
 
 OF_DESIGNS = ("check --suggest {}", "run {} --json")
 SECONDS = 120.0
@@ -37,7 +36,7 @@ def lines() -> list[str]:
     """The commands, in the folder of the shown ones."""
     names = [path.relative_to(TOP).as_posix() for path in sorted((TOP / "designs").rglob("*.yaml"))]
     of_designs = [form.format(shlex.quote(name)) for form in OF_DESIGNS for name in names]
-    return [*RECIPES, *LINES, *of_designs]
+    return [*KEPT, *of_designs]
 
 
 def shown(every: Sequence[Mutant], progress: Callable[[str], None]) -> dict[str, Shown]:

@@ -182,8 +182,7 @@ def assumption_effects(experiment: Experiment, lengths: Quantity) -> Assumptions
             quantity = found.get(assumption.name)
             effects.append(_effect(experiment, assumption, lengths, together, quantity))
         except ExperimentError as error:
-            first = error.messages[0]
-            left_out.append((assumption.name, ": ".join(filter(None, (first.path, first.text)))))
+            left_out.append((assumption.name, error.messages[0].text_with_path))
     # Undetermined distances cost more than any uncertainty.
     effects.sort(key=lambda effect: (effect.undetermined, effect.ratio), reverse=True)
     return Assumptions(

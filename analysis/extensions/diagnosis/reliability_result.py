@@ -310,9 +310,9 @@ def _effect(result: Reliability, symbol: str) -> np.ndarray:
         return np.where(is_defined, result.minimal_detectable * change, np.nan)
 
 
-def _has_effect(result: Reliability, symbol: str) -> np.ndarray:
-    """Return which biases (k,) have an effect that is more than rounding."""
-    return result.effects[symbol].change > NOTHING * result.sizes
+def _has_effect(result: Reliability, symbol: str, k: int | slice = slice(None)) -> np.ndarray:
+    """Return which of the chosen biases have an effect that is more than rounding."""
+    return result.effects[symbol].change[k] > NOTHING * result.sizes[k]
 
 
 def _finite_or_zero(values: np.ndarray) -> np.ndarray:
@@ -421,14 +421,24 @@ def _location(result: Reliability, symbol: str, k: int) -> str:
     """Return the points of the largest effect."""
     effects, design = result.effects[symbol], result.design
     first, second = int(effects.first[k]), int(effects.second[k])
-    if first < 0 or not _has_effect(result, symbol)[k]:
+    if first < 0 or not _has_effect(result, symbol, k):
         return ""
     return function_name(design, effects.functions[0], first, second)
 
 
+def _effect_data(result: Reliability, symbol: str, k: int) -> Data:
+    hidden, effects = math.isinf(result.minimal_detectable[k]), result.effects[symbol]
+    size = effects.change[k] * (1.0 if hidden else result.minimal_detectable[k])
+    has_effect = _has_effect(result, symbol, k)
+    return {
+        "per_unit" if hidden else "change": float(size) if has_effect else 0.0,
+        # That of the function with the largest change, which rounding would choose.
+        "standard_uncertainty": effects.uncertainty[k] if has_effect else None,
+        "at": _location(result, symbol, k),
+    }
+
+
 def _pattern_data(result: Reliability, k: int) -> Data:
-    hidden = math.isinf(result.minimal_detectable[k])
-    has_effect = {symbol: _has_effect(result, symbol)[k] for symbol in result.effects}
     return {
         "name": name(result.patterns, k),
         "kind": str(result.patterns.kind[k]),
@@ -437,19 +447,7 @@ def _pattern_data(result: Reliability, k: int) -> Data:
         "found_by_fit": result.found_by_fit[k],
         **({"harmless": result.is_harmless(k)} if result.information[k] <= 0.0 else {}),
         "effects": {
-            symbol: {
-                "per_unit" if hidden else "change": float(
-                    result.effects[symbol].change[k]
-                    * (1.0 if hidden else result.minimal_detectable[k])
-                    if has_effect[symbol]
-                    else 0.0
-                ),
-                # That of the function with the largest change, which rounding would choose.
-                "standard_uncertainty": result.effects[symbol].uncertainty[k]
-                if has_effect[symbol]
-                else None,
-                "at": _location(result, symbol, k),
-            }
+            symbol: _effect_data(result, symbol, k)
             for symbol in result.effects
             if result.effects[symbol].first[k] >= 0
         },

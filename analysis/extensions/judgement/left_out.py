@@ -18,7 +18,7 @@ from ballplate.results import campaign_sigmas
 from ballplate.simulator.computing import (
     ProgressStep,
     Report,
-    comparable,
+    first_largest,
     single_threaded,
     unreported,
 )
@@ -215,7 +215,7 @@ def _worst(
         return None
     deviations = np.sqrt(np.where(can, fit_of_rest.variances, 1.0))
     standardised = np.where(can, fit_of_rest.errors / deviations, 0.0) / scale
-    worst = int(comparable(np.abs(standardised)).argmax())
+    worst = first_largest(np.abs(standardised))
     reading, axis = divmod(int(fit_of_rest.rows[worst]), design.dimension)
     k = int(design.plate_readings[reading])
     uncertainties = reading_uncertainties(observed.design, observed.design.readings)[k, axis]
@@ -262,7 +262,7 @@ def _length_difference(
     if not is_known.any():
         return None
     change = np.where(is_known, length_of_rest - length_of_full, 0.0)
-    k = int(comparable(np.abs(change)).argmax())
+    k = first_largest(np.abs(change))
     variance = max(float(u_rest[k] ** 2 - u_full[k] ** 2), 0.0)
     return LengthDifference(
         float(change[k]),

@@ -134,10 +134,10 @@ def _outline(points: Array) -> Array:
     corners = hull((points - centre) @ plane.T) if len(points) > 1 else np.zeros((1, len(plane)))
     outline = centre + corners @ plane[: corners.shape[1]]
     # Rounding decides where the hull begins, and which side of the plane is seen.
-    order = [tuple(corner) for corner in np.round(outline, 9).tolist()]
-    turned = np.roll(outline, -order.index(min(order)), axis=0)
-    second, last = (tuple(np.round(turned[k], 9).tolist()) for k in (1 % len(turned), -1))
-    return turned if second <= last else np.roll(turned[::-1], 1, axis=0)
+    rounded, count = np.round(outline, 9).tolist(), len(outline)
+    first = rounded.index(min(rounded))
+    step = 1 if rounded[(first + 1) % count] <= rounded[first - 1] else -1
+    return outline[(first + step * np.arange(count)) % count]
 
 
 def _some(balls: Integers) -> Integers:

@@ -173,4 +173,4 @@ def in_words(error: Exception) -> str:
     """Return what is wrong, each message about a file with its path."""
     if not isinstance(error, ExperimentError):
         return str(error)
-    return "; ".join(": ".join(filter(None, [one.path, one.text])) for one in error.messages)
+    return "; ".join(one.text_with_path for one in error.messages)
