@@ -297,6 +297,50 @@ LINES = (
     ),
     "'run --budget' effects.yaml effects.csv --by position --json",
     *("map gec-like.yaml --budget --grid 2,2,2", "'map --curves' gec-like.yaml --json"),
+    *(
+        f"{command} shifted.yaml{more}"
+        for command, more in (
+            ("run", " --trials 5 --workers 1 --json"),
+            ("run", " --report out.html"),
+            ("'run --errors'", ""),
+            ("'run --budget'", " --by position --json"),
+            ("'run --reliability'", " --json"),
+            ("sheet", " -o out.html --points out.dmi --ball-diameter '20 mm'"),
+            ("fit", " shifted.csv --report out.html -o new.yaml --plot out.svg"),
+            ("validate", " shifted.csv --json"),
+            ("models", " shifted.csv"),
+            ("certificate", " shifted.csv --plate few -o out.html"),
+            ("next", " shifted.csv --json"),
+            ("reach", " --by certificate --target '1 um'"),
+            ("compare", " --trials 2 --points 5"),
+        )
+    ),
+    *(
+        f"{name} partial.csv"
+        for name in ("fit small.yaml", "validate small.yaml", "next small.yaml")
+    ),
+    *(f"import {name} --for shifted.yaml -o -" for name in ("large-low.dmo", "sets.qif")),
+    *(f"fit small.yaml {name}.csv" for name in ("numbers", "disordered", "two-tables")),
+    *("simulate shifted.yaml -o -", "check --no-modules effects.yaml"),
+    "fit small.yaml two-tables.csv --columns 'x=X mm,y=Y mm'",
+    "run bar-bell.yaml --variant 'length unknown' --trials 4 --workers 1 --json",
+    *(
+        f"fit {DUMMY} --estimator reversal {more}"
+        for more in ("--pairs all", "--across-probes", "--monomials", "--no-offsets --scale none")
+    ),
+    *(f"fit {DUMMY} {more}" for more in ("--scale x", "--no-offsets")),
+    "fit tables.yaml tables-readings.csv --estimator reversal",
+    *(
+        "simulate bar-bell.yaml -o out.csv",
+        "check doubtful.yaml",
+        "check bar-bell.yaml --variant long",
+    ),
+    "compare dummy.yaml --variant 'with scale' --pairs braced",
+    "check --suggest certified/weak.yaml",
+    "check --suggest --json small.yaml --goal 'U6 average 0.3 um'",
+    "sweep reasons.yaml --workers 1",
+    "reach limited.yaml --by hours --target '3 um'",
+    *(f"reproduce npl --quick --trials 2 --experiment {name}" for name in ("6.1.2", "6.2.5")),
     "init out.yaml --machine-type 'horizontal arm' --volume '1 x 2.5 x 1.5 m' --mpe '15 um + L/100'"
     " --plate '5 x 5, 600 mm' --certificate '1 um, k=2' --hours 6",
 )
@@ -322,7 +366,79 @@ ACTIONS = tuple(
         'limited.yaml pool {"do": "fill", "probes": {"z": ["down"], "x": ["right"]}, "quarter_turns": [0, 1], "count": 2}',
         'limited.yaml pool {"do": "forbid", "corner": ["low", "high", "low"]}',
         'small.yaml later {"do": "fit"}',
+        'certified/deficient.yaml suggest {"do": "set", "path": ["seed"], "value": 3}',
+        'small.yaml next {"do": "remove", "position": "y high"}',
+        'limited.yaml next {"do": "off", "position": "z low"}',
+        'limited.yaml plan {"do": "off", "position": "z low", "hours": 2}',
+        'small.yaml monte carlo {"do": "turn", "position": "high", "trials": 4}',
+        'shifted.yaml drawn {"do": "move", "position": "few 2", "by": [0.01, -0.02, 0.05]}',
     )
 )
 
-KEPT = (*RECIPES, *LINES, *ACTIONS)
+DUMMY_TURNED = (
+    "load('dummy.yaml', 'with scale').with_({'positions[0].pose.rotation': '-89.9 deg',"
+    " 'machine.repeatability': '0.5 um'})"
+)
+JOINED = {
+    **{f"artefacts.{name}.role": "plate" for name in ("bar", "rod")},
+    "priors": [{"kind": "map", "file": "shifted-map.yaml", "inflation": 2.0}],
+    "influences": [
+        {"kind": "drift", "axes": {"standard_uncertainty": "0.5 um/h"}},
+        {"kind": "sag", "artefact": "large", "value": "1 um", "standard_uncertainty": "0.4 um"},
+    ],
+}
+# Expressions of Python with the names of the package.
+PYTHON = "python: "
+EXPRESSIONS = tuple(
+    f"{PYTHON}{line}"
+    for line in (
+        "diff('map.yaml', 'again.yaml', dates='2025-01-01')",
+        "diff('map.yaml', 'again.yaml', grid=6, dates=('2025-01-01',))",
+        "plan('pool.yaml', positions=2, hours=-1.0)",
+        "run('small.yaml', until=0.0)",
+        "run('small.yaml', until=0.2, trials=0)",
+        "reach('small.yaml', unknowns=['repeats', 'repeatability'], target='1 um', share=0.8)",
+        "reach('tables.yaml', unknowns='certificate', calibration=7)",
+        "reliability('small.yaml', false_alarm=0.0)",
+        "reliability('small.yaml', power=1.0)",
+        "fit('small.yaml', 'small-readings.csv', estimator='kruth', pairs='corners')",
+        "fit('small.yaml', 'small-readings.csv', offsets=False)",
+        "fit('small.yaml', simulate('shifted.yaml'))",
+        "compare_models('small.yaml', 'small-readings.csv', coefficients=0)",
+        "correct('map.yaml', [[0.1, 0.2, 0.3], [0.4, 0.2, 0.1]], probe='down', lengths=[(0, 1)])",
+        "correct('map.yaml', [[0.1, 0.2]], probe='up')",
+        "curves('map.yaml', errors=['EXX', 'EBY'], points=3)",
+        "map('machine.yaml', grid=(2, 1, 2))",
+        "map('map.yaml', points=[[0.1, 0.2, 0.3]], draw=2, seed=3, probe='right')",
+        "spline('curve.csv', every=3, knots='50 mm')",
+        "information('small.yaml', added=[quickstart()])",
+        "simulate('small.yaml', exact=True).describe().to_dict()",
+        "check('shifted.yaml', goals=['U6 average 0.1 um', 'U5'], share=2.0)",
+        "load('small.yaml').with_({'machine.repeatability': '1 m', 'probes.up': []})",
+        "load_map('small.yaml')",
+        *(f"load('small.yaml').with_({{'positions[0].quarter_turns': {k}}})" for k in (90, -90)),
+        "read_report('z-low.dmo', 'quickstart.yaml', unit='ft')",
+        "budget('shifted.yaml', by='probe')",
+        f"fit(x := {DUMMY_TURNED}, simulate(x), estimator='reversal', scale='y').lines()",
+        f"fit(x := {DUMMY_TURNED}, simulate(x), estimator='reversal', offsets=False).lines()",
+        f"compare(x := {DUMMY_TURNED}, estimator='reversal', trials=2, points=4).lines()",
+        f"run(x := load('shifted.yaml').with_({JOINED})).lines()",
+        f"fit(x := load('shifted.yaml').with_({JOINED}), simulate(x)).lines()",
+        *(
+            f"run(load('small.yaml').with_({{{change}}})).lines()"
+            for change in (
+                "'error_model': {'kind': 'empirical', 'coefficients': 3, 'terms': 'sums'}",
+                "'error_model.arrangement': 'CX1', 'error_model.rotations': 'full'",
+                "'error_model': {'kind': 'metric'}, 'probes.right': {'offset': ['60 mm', '0 mm', '0 mm'], 'unknown': True}",
+                "'true_machine': None, 'calibration': [], 'positions[1].balls': ['r1c1', 'r3c3']",
+                "'positions[0].probes': ['right'], 'expected_rank_deficiency': 2",
+            )
+        ),
+        "plan(load('limited.yaml').with_({'pool.times.set_up': '1 h'}), hours=5.0).lines()",
+        "plan('limited.yaml', readings=60, criterion='U5-maximum').lines()",
+        "run(load('splines.yaml', 'plain')).lines() + run(load('splines.yaml', 'tensor')).lines()",
+        "fit(x := load('splines.yaml', 'tensor'), simulate(x)).lines()",
+    )
+)
+
+KEPT = (*RECIPES, *LINES, *ACTIONS, *EXPRESSIONS)

@@ -60,6 +60,7 @@ def drawn(figure: Any) -> str:
         lines.append(f"axes {axes.get_xlabel()}, {axes.get_ylabel()}: {ends.ravel().tolist()}")
         for line in axes.lines:
             form = (line.get_label(), line.get_color(), line.get_marker(), line.get_linestyle())
+            form += (line.get_markersize(), line.get_linewidth())
             lines.append(f"line {form} {told(line.get_xydata())}")
         paths = [patch.get_path() for patch in axes.patches]
         paths += [path for some in axes.collections for path in some.get_paths()]
@@ -126,10 +127,13 @@ def kept() -> dict[str, list[str]]:
 
 
 def keep(outcomes: Mapping[str, Sequence[str]]) -> None:
-    """Write what is kept, a file for each command."""
-    FOLDER.mkdir(exist_ok=True)
+    """Write what is kept, a file for each command; what is alike stays as it is."""
+    before = kept()
     texts: dict[str, str] = {}
     for name, lines in outcomes.items():
+        was = before.get(name, [])
+        if len(was) == len(lines) and all(map(are_alike, lines, was)):
+            lines = was
         command = re.sub(r"\W+", "-", name.split("'")[1] if name[0] == "'" else name.split()[0])
         text = texts.setdefault(command, "Written by `python -m tests.cli.outcomes`.\n")
         texts[command] = text + "\n".join([f"\n$ {name}", *lines, ""])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import os
 import re
@@ -14,7 +13,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.cli import GROUPS, commands_of_all, main
-from ballplate.planning.criteria import NAMES as CRITERIA
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.machines.truth import true_parameters
@@ -127,20 +125,6 @@ def test_fit_names_missing_and_unplanned_readings(
     assert wording.READ_BUT_NOT_PLANNED_LOW in err
 
 
-def test_fit_of_wrong_readings(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    readings = tmp_path / "readings.csv"
-    readings.write_text(
-        "position,ball,probe,x_mm,y_mm,z_mm\nz lo,r1c1,down,1,2,3\nz low,r9c9,downn,1,2,x\n",
-        encoding="utf-8",
-    )
-    assert run("fit", QUICKSTART, readings) == 3
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert f'{readings}:3:22: "x" is not a number' in err
-    assert wording.UNKNOWN_POSITION_DID_YOU_MEAN in err
-    assert 'unknown ball "r9c9"' in err and wording.UNKNOWN_PROBE_DID_YOU_MEAN in err
-
-
 def quickstart_readings(folder: Path, *options: str) -> tuple[Path, list[str]]:
     path = folder / "readings.csv"
     run("simulate", QUICKSTART, "-o", path, *options)
@@ -199,15 +183,6 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
         main(["--version"])
     assert caught.value.code == 0
     assert capsys.readouterr().out == f"ballplate {version('ballplate')}\n"
-
-
-def test_a_file_with_variants_needs_a_choice_to_fit(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    assert run("simulate", "designs/npl/6.1.1.yaml", "-o", tmp_path / "r.csv") == 3
-    assert wording.CHOOSE_ONE_WITH_VARIANT in capsys.readouterr().err
-    assert run("check", "designs/npl/6.1.1.yaml", "--variant", "E") == 3
-    assert 'no variant "E"' in capsys.readouterr().err
 
 
 def test_init_writes_the_quickstart(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -374,10 +349,3 @@ def test_fit_reads_the_tables_that_the_file_names(tmp_path: Path) -> None:
     path.write_text(PLATE + "readings: {files: r.csv}\n", encoding="utf-8")
     assert run("simulate", path, "-o", tmp_path / "r.csv") == 0
     assert run("fit", path) == 0
-
-
-def test_help_lists_each_criterion_of_plans(capsys: pytest.CaptureFixture[str]) -> None:
-    with contextlib.suppress(SystemExit):
-        run("plan", "--help")
-    out = " ".join(capsys.readouterr().out.split())
-    assert f"{', '.join(CRITERIA[1:-1])} or {CRITERIA[-1]}" in out

@@ -19,52 +19,6 @@ from tests.cli.walk import small_file
 QUICKSTART = Path("designs/quickstart.yaml")
 
 
-@pytest.mark.parametrize(
-    ("stated", "told"),
-    [
-        (
-            "0.4 mm",
-            (
-                "0.4 mm is far above the repeatability of a co-ordinate measuring machine;"
-                " write 0.4 um if"
-            ),
-        ),
-        ("[0.2 um, 0.2 mm, 0.2 um]", "0.2 mm is far above"),
-        ("50 um", ""),
-        ("0.2 um", ""),
-    ],
-)
-def test_a_repeatability_of_another_unit(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], stated: str, told: str
-) -> None:
-    text = QUICKSTART.read_text()
-    line = next(line for line in text.splitlines() if line.strip().startswith("repeatability:"))
-    path = tmp_path / "e.yaml"
-    path.write_text(text.replace(line, f"  repeatability: {stated}"))
-    assert main(["check", str(path)]) == 0
-    err = capsys.readouterr().err
-    number = text.splitlines().index(line) + 1
-    assert (
-        err.startswith(f"warning: {path}:{number}:18: machine.repeatability: {told}")
-        if told
-        else err == ""
-    )
-
-
-@pytest.mark.parametrize(
-    ("turns", "meant"), [(90, "1 for 90 deg"), (270, "3 for 270 deg"), (-90, "3 for -90 deg")]
-)
-def test_quarter_turns_in_degrees_are_refused(tmp_path: Path, turns: int, meant: str) -> None:
-    path, text = tmp_path / "e.yaml", QUICKSTART.read_text()
-    assert "quarter_turns: 1" in text
-    path.write_text(text.replace("quarter_turns: 1", f"quarter_turns: {turns}"))
-    with pytest.raises(
-        ExperimentError,
-        match=rf"\.quarter_turns: {turns} is not a number of turns .*; write {meant}",
-    ):
-        load(path)
-
-
 @pytest.mark.parametrize(("turns", "same"), [(4, 0), (-1, 3), (6, 2)])
 def test_other_numbers_of_turns_are_refused_with_the_one_that_turns_as_far(
     tmp_path: Path, turns: int, same: int

@@ -5,6 +5,7 @@ something that it has not without it.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import csv
 import json
 import shlex
@@ -16,17 +17,19 @@ from pathlib import Path
 from typing import Any
 from unittest.mock import patch
 
+import ballplate as bp
 import openpyxl
 import pytest
 from ballplate.extensions.studio.actions import ActionError, done
 from ballplate.extensions.studio.document import opened
+from ballplate.extensions.studio.jobs import JOBS
 from ballplate.extensions.studio.judging import VIEWS, judgement
 from ballplate.presentation import as_data
 from ballplate.simulator.computing import unreported
 from ballplate.simulator.inputs import ExperimentError
 from matplotlib.figure import Figure
 
-from tests.cli.option_table import KEPT, LIMITED, READING, STUDIO, TABLE, TABLES
+from tests.cli.option_table import KEPT, LIMITED, PYTHON, READING, STUDIO, TABLE, TABLES
 from tests.cli.outcomes import are_alike, changes, drawn, kept, shortened
 from tests.cli.walk import WALK, commands
 from tests.reference.small_plate import PLATE
@@ -96,11 +99,16 @@ def filled(folder: Path) -> Path:
     for name in ("samples", "exports"):
         shutil.copytree(FILES.parents[1] / "extensions" / "laboratory" / name, folder / name)
     outcome(f"{LIMITED} --positions 5 -o limited-plan.yaml".split(), folder)
-    for name in ("effects", "lost", "limited-plan", "certified/weak"):
+    for name in ("effects", "lost", "limited-plan", "certified/weak", "shifted"):
         outcome(["simulate", f"{name}.yaml", "-o", f"{name}.csv"], folder)
+    outcome(
+        ["fit", "shifted.yaml", "shifted.csv", "-o", "shifted-map.yaml", "--date", "2026-11-22"],
+        folder,
+    )
     for name, source, rows in (
         ("begun", "planned-readings", 7),
         ("begun-limited", "limited-plan", 20),
+        ("partial", "small-readings", 64),
     ):
         lines = (folder / f"{source}.csv").read_text(encoding="utf-8").splitlines(True)[:rows]
         (folder / f"{name}.csv").write_text("".join(lines), encoding="utf-8")
@@ -149,12 +157,22 @@ def stamps(folder: Path) -> dict[Path, tuple[int, int]]:
 
 
 def acted(line: str, folder: Path) -> tuple[int, str, str]:
-    """The text of a design after an action of the studio, its judgement, and a view of it."""
-    name, view, data = line.removeprefix(STUDIO).split(" ", 2)
-    action, document = json.loads(data), opened(folder / name)
+    """The value of an expression; or the text of a design after an action of the studio, its
+    judgement, and a view of it.
+    """
+    if line.startswith(PYTHON):
+        with contextlib.chdir(folder):
+            try:
+                shown = eval(line.removeprefix(PYTHON), {k: getattr(bp, k) for k in dir(bp)})
+            except (ValueError, TypeError, ExperimentError) as error:
+                shown = f"{type(error).__name__}: {error}"
+        return 0, json.dumps(as_data(shown), indent=1, default=str), ""
+    name, rest = line.removeprefix(STUDIO).split(" ", 1)
+    view, _, data = rest.partition(" {")
+    action, document = json.loads(f"{{{data}"), opened(folder / name)
     try:
         document = done(document, action)
-        shown = VIEWS[view](document, {**action, "revision": 0}, unreported)
+        shown = {**VIEWS, **JOBS}[view](document, {**action, "revision": 0}, unreported)
     except (ActionError, ExperimentError) as error:
         shown = str(error)
     told = json.dumps(as_data(judgement(document)), indent=1, default=str)
@@ -169,8 +187,8 @@ def written(line: str, kit: Path) -> str:
         shutil.copytree(kit, folder)
     before = stamps(folder)
     with patch.object(Figure, "savefig", lambda self, to, **_: to.write(drawn(self).encode())):
-        of_studio = line.startswith(STUDIO)
-        status, out, err = acted(line, folder) if of_studio else outcome(shlex.split(line), folder)
+        is_command = not line.startswith((STUDIO, PYTHON))
+        status, out, err = outcome(shlex.split(line), folder) if is_command else acted(line, folder)
     parts, after = [f"status {status}", out, err], stamps(folder)
     changed = (path for path in after if after[path] != before.get(path))
     # Whether a lock is left is chance.

@@ -252,34 +252,6 @@ def test_balls_read_in_one_position_are_left_out(tmp_path: Path) -> None:
     assert wording.LEAVES_OUT_WHAT_IS_NOT_READ in one.cautions[0]
 
 
-def test_no_reversal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Everything that is not as it should be is named at once, at its place, with nothing on
-    standard output.
-    """
-    path, readings = tmp_path / "e.yaml", str(tmp_path / "r.csv")
-    path.write_text(
-        "title: t\n"
-        "machine: {volume: [1 m, 1 m, 1 m], repeatability: 0.2 um}\n"
-        "error_model: {kind: kinematic}\n"
-        "probes: {down: [0 mm, 0 mm, 0 mm]}\n"
-        "artefacts:\n"
-        "  plate: {kind: grid, balls: [3, 3], size: [500 mm, 500 mm]}\n"
-        "  ball: {kind: sphere}\n"
-        "positions:\n"
-        "  - {name: low, artefact: plate, plane: z, level: 0 mm, corner: {x: 0 mm, y: 0 mm}}\n"
-        "  - {name: high, artefact: plate, plane: z, level: 500 mm, corner: {x: 0 mm, y: 0 mm}}\n"
-        "  - {name: there, artefact: ball, pose: {origin: [0 mm, 0 mm, 0 mm]}}\n"
-    )
-    told(capsys, "simulate", str(path), "-o", readings)
-    out, err = told(capsys, "fit", str(path), readings, *REVERSAL, status=3)
-    found = [line.removeprefix(f"{path}:").split(", not")[0] for line in err.splitlines()]
-    assert out == "" and found == [
-        wording.THE_REVERSAL_NEEDS_A_MACHINE,
-        wording.THE_REVERSAL_TAKES_ONE_ARTEFACT,
-        wording.THE_REVERSAL_TAKES_TWO_POSITIONS,
-    ]
-
-
 def refused(experiment: bp.Experiment, readings: Any, words: str, **options: Any) -> None:
     with pytest.raises(bp.ExperimentError, match=re.escape(words)):
         bp.fit(experiment, readings, **AS_REVERSAL, **options)
@@ -320,20 +292,3 @@ def test_several_probes_and_priors() -> None:
     readings = bp.simulate(known)
     assert bp.fit(known, readings, **AS_REVERSAL).to_dict()["scale"] == "x"
     refused(known, readings, wording.PRIORS_REFER_TO_THE_FILES_ERROR, scale="none")
-
-
-def test_options_of_the_reversal_alone(capsys: pytest.CaptureFixture[str]) -> None:
-    for option in (["--pairs", "all"], ["--across-probes"]):
-        _, err = told(capsys, "fit", *DUMMY, *REVERSAL, *option, status=2)
-        assert (
-            f"{option[0]} applies to --estimator distances, cresto or kruth only; leave it out"
-            in err
-        )
-    _, err = told(capsys, "fit", *DUMMY, *REVERSAL, "--monomials", status=2)
-    assert wording.MONOMIALS_APPLIES_TO_ESTIMATOR_FULL in err
-    for option in (["--scale", "x"], ["--no-offsets"]):
-        _, err = told(capsys, "fit", *DUMMY, *option, status=2)
-        assert f"{option[0]} applies to --estimator reversal only; leave it out" in err
-    with pytest.raises(SystemExit) as caught:
-        main(["fit", *DUMMY, *REVERSAL, "--scale", "z"])
-    assert caught.value.code == 2

@@ -86,17 +86,6 @@ def test_compare(capsys: pytest.CaptureFixture[str]) -> None:
     assert json.loads(capsys.readouterr().out)["rms"]["values"] == found["rms"]["values"][:2]
 
 
-def test_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
-    for arguments in (["--trials", "0"], ["--points", "100001"], ["--estimator", "best"]):
-        with pytest.raises(SystemExit) as caught:
-            main([*COMPARED, *arguments])
-        assert caught.value.code == 2
-    capsys.readouterr()
-    square = ["designs/npl/6.2.2.yaml", "--variant", "n=5 NDEL=5", "--trials", "1"]
-    assert main(["compare", *square, "--pairs", "braced"]) == 3
-    assert wording.IS_NOT_DEFINED_FOR_THIS_ARTEFACT in capsys.readouterr().err
-
-
 def test_repeats_of_a_length_standard_are_not_mistaken_for_other_readings() -> None:
     sections = small_sections()
     for one in (*sections["positions"], *sections["calibration"]):

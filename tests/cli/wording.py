@@ -37,7 +37,6 @@ CANNOT_BE_WRITTEN = (
 )
 CANNOT_FOLLOW_AN_UNKNOWN_LENGTH = "cannot follow an unknown length (bar: length)"
 CELLS_DONE_FAILED_OF_THEM_BEFORE = "6 cases, 4 done, 2 failed (2 of them before)"
-CHOOSE_ONE_WITH_VARIANT = "choose one with --variant: A, B, C, D"
 CORRECT_OR_REMOVE = "correct or remove it"
 CORRECT_THE_NAMES_OF_THE_BALLS = "correct the names of the balls"
 DATA_SETS_OF = "data sets of 6.2.7[5 x 5]"
@@ -73,7 +72,6 @@ IS_A_PLATE_BUT_LENGTH_EQUATIONS = (
     "artefacts.bar: is a plate, but length-equations needs length standards"
 )
 IS_MM_FROM_WHERE_IT_SHOULD = "is 10 mm from its expected location"
-IS_NOT_DEFINED_FOR_THIS_ARTEFACT = '"braced" is not defined for this artefact'
 IS_TURNED_BY_DEGREES = '"turned" is turned by 89.992480 degrees, clockwise, from "first"'
 LEAVES_OUT_WHAT_IS_NOT_READ = "omits balls that are not read in both positions: r2c2, r3c1"
 MM_IS_FAR_FROM_THE_MM = (
@@ -82,9 +80,6 @@ MM_IS_FAR_FROM_THE_MM = (
 )
 MODULES_ARE_NOT_ALLOWED_HERE = "modules are not allowed here"
 MODULES_ARE_NOT_ALLOWED_HERE_LEAVE = "modules are not allowed here; leave --no-modules out"
-MONOMIALS_APPLIES_TO_ESTIMATOR_FULL = (
-    "--monomials applies to --estimator full, distances, cresto or kruth only; leave it out"
-)
 OF_THE_STATED_ONES = "of the stated ones"
 ONLY_A_BRYAN_GAUGE_HAS = (
     '20:12: calibration[1].kind: only a Bryan gauge has a radius, and "bar" is not one; '
@@ -125,14 +120,7 @@ THE_RADIUS_OF_IS_ALREADY = (
     '23:5: calibration[4]: the radius of "over" is already in calibration[3]; remove one of the two'
 )
 THE_RESULTS_ARE_THOSE = "interrupted: the results are those of the data sets done so far"
-THE_REVERSAL_NEEDS_A_MACHINE = (
-    '3:21: error_model.kind: the reversal needs a machine of kind "metric" in two dimensions'
-)
 THE_REVERSAL_NEEDS_TWO_DIMENSIONS = "the reversal needs two dimensions, not three"
-THE_REVERSAL_TAKES_ONE_ARTEFACT = "5:1: artefacts: the reversal takes one artefact"
-THE_REVERSAL_TAKES_TWO_POSITIONS = (
-    "8:1: positions: the reversal takes two positions, a quarter turn apart"
-)
 THE_SCALE_RESTS_ON_PROBE_OFFSETS = "warning: the scale rests on probe offsets"
 THREE_PARAMETERS_NO_OFFSETS = (
     "three parameters, no offsets, scale difference: none (fitted, but not applied)"
@@ -140,6 +128,4 @@ THREE_PARAMETERS_NO_OFFSETS = (
 UNKNOWN_PARAMETER_DID_YOU_MEAN = (
     '25:17: priors[0].parameter: unknown parameter "a: rotation z"; did you mean "a: origin z"?'
 )
-UNKNOWN_POSITION_DID_YOU_MEAN = 'unknown position "z lo"; did you mean "z low"?'
-UNKNOWN_PROBE_DID_YOU_MEAN = 'unknown probe "downn"; did you mean "down"?'
 WHATEVER_THE_FILES_ERROR_MODEL = "regardless of the file's error model"
