@@ -73,8 +73,8 @@ def ascii_units(text: str) -> str:
 def number(value: float, digits: int = 4) -> str:
     """Return a number with significant digits, or a dash for NaN.
 
-    >>> number(0.123456), number(12345.678), number(float("nan"))
-    ('0.1235', '12350', '-')
+    >>> number(0.123456), number(12345.678), number(1.23456e-10), number(float("nan"))
+    ('0.1235', '12350', '1.235e-10', '-')
     """
     if math.isnan(value):
         return "-"

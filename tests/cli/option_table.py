@@ -311,6 +311,10 @@ LINES = (
             ("models", " shifted.csv"),
             ("certificate", " shifted.csv --plate few -o out.html"),
             ("next", " shifted.csv --json"),
+            (
+                "certificate",
+                " shifted.csv --plate large --sigma given -o out.xml --about date=2026-11-02 --about country=DE",
+            ),
             ("reach", " --by certificate --target '1 um'"),
             ("compare", " --trials 2 --points 5"),
         )
@@ -323,6 +327,8 @@ LINES = (
     *(f"fit small.yaml {name}.csv" for name in ("numbers", "disordered", "two-tables")),
     *("simulate shifted.yaml -o -", "check --no-modules effects.yaml"),
     "fit small.yaml two-tables.csv --columns 'x=X mm,y=Y mm'",
+    *(f"map shifted-machine.yaml {more}" for more in ("--grid 2,2,2 --budget", "--draw 2")),
+    "'map --curves' shifted-machine.yaml",
     "run bar-bell.yaml --variant 'length unknown' --trials 4 --workers 1 --json",
     *(
         f"fit {DUMMY} --estimator reversal {more}"
@@ -369,6 +375,7 @@ ACTIONS = tuple(
         'certified/deficient.yaml suggest {"do": "set", "path": ["seed"], "value": 3}',
         'small.yaml next {"do": "remove", "position": "y high"}',
         'limited.yaml next {"do": "off", "position": "z low"}',
+        'shifted.yaml next {"do": "off", "position": "few 2"}',
         'limited.yaml plan {"do": "off", "position": "z low", "hours": 2}',
         'small.yaml monte carlo {"do": "turn", "position": "high", "trials": 4}',
         'shifted.yaml drawn {"do": "move", "position": "few 2", "by": [0.01, -0.02, 0.05]}',
@@ -401,7 +408,7 @@ EXPRESSIONS = tuple(
         "reach('tables.yaml', unknowns='certificate', calibration=7)",
         "reliability('small.yaml', false_alarm=0.0)",
         "reliability('small.yaml', power=1.0)",
-        "fit('small.yaml', 'small-readings.csv', estimator='kruth', pairs='corners')",
+        "fit('small.yaml', 'small-readings.csv', estimator='cresto', pairs='corners')",
         "fit('small.yaml', 'small-readings.csv', offsets=False)",
         "fit('small.yaml', simulate('shifted.yaml'))",
         "compare_models('small.yaml', 'small-readings.csv', coefficients=0)",
@@ -419,25 +426,36 @@ EXPRESSIONS = tuple(
         *(f"load('small.yaml').with_({{'positions[0].quarter_turns': {k}}})" for k in (90, -90)),
         "read_report('z-low.dmo', 'quickstart.yaml', unit='ft')",
         "budget('shifted.yaml', by='probe')",
-        f"fit(x := {DUMMY_TURNED}, simulate(x), estimator='reversal', scale='y').lines()",
-        f"fit(x := {DUMMY_TURNED}, simulate(x), estimator='reversal', offsets=False).lines()",
-        f"compare(x := {DUMMY_TURNED}, estimator='reversal', trials=2, points=4).lines()",
-        f"run(x := load('shifted.yaml').with_({JOINED})).lines()",
-        f"fit(x := load('shifted.yaml').with_({JOINED}), simulate(x)).lines()",
+        *(f"{name}('effects.yaml')" for name in ("assumptions", "budget", "sheet", "reliability")),
+        *(f"{name}('small.yaml', 'off.csv')" for name in ("fit", "validate", "compare_models")),
+        "diff('shifted-map.yaml', 'again.yaml', grid=2)",
+        "spline('curve.csv', boundary=['100 mm'], end_slope='1 um/mm')",
+        "stored('trials.sqlite')",
+        "read_report('large-low.dmo', 'shifted.yaml')",
+        "run('small.yaml', trials=4)",
+        "fit(x := load('angles.yaml', 'quarter turn'), simulate(x), estimator='reversal')",
+        f"fit(x := {DUMMY_TURNED}, simulate(x), estimator='reversal', sigma='given')",
+        "fit(x := load('small.yaml').with_({'error_model': {'kind': 'metric'}}), simulate(x))",
+        f"fit(x := {DUMMY_TURNED}, simulate(x), estimator='reversal', scale='y')",
+        f"fit(x := {DUMMY_TURNED}, simulate(x), estimator='reversal', offsets=False)",
+        f"compare(x := {DUMMY_TURNED}, estimator='reversal', trials=2, points=4)",
+        f"run(x := load('shifted.yaml').with_({JOINED}))",
+        f"fit(x := load('shifted.yaml').with_({JOINED}), simulate(x))",
         *(
-            f"run(load('small.yaml').with_({{{change}}})).lines()"
+            f"run(load('small.yaml').with_({{{change}}}))"
             for change in (
                 "'error_model': {'kind': 'empirical', 'coefficients': 3, 'terms': 'sums'}",
                 "'error_model.arrangement': 'CX1', 'error_model.rotations': 'full'",
                 "'error_model': {'kind': 'metric'}, 'probes.right': {'offset': ['60 mm', '0 mm', '0 mm'], 'unknown': True}",
                 "'true_machine': None, 'calibration': [], 'positions[1].balls': ['r1c1', 'r3c3']",
-                "'positions[0].probes': ['right'], 'expected_rank_deficiency': 2",
+                "'positions[2].probes': ['right'], 'expected_rank_deficiency': 2",
             )
         ),
-        "plan(load('limited.yaml').with_({'pool.times.set_up': '1 h'}), hours=5.0).lines()",
-        "plan('limited.yaml', readings=60, criterion='U5-maximum').lines()",
-        "run(load('splines.yaml', 'plain')).lines() + run(load('splines.yaml', 'tensor')).lines()",
-        "fit(x := load('splines.yaml', 'tensor'), simulate(x)).lines()",
+        "plan(load('limited.yaml').with_({'pool.times.set_up': '1 h'}), hours=5.0)",
+        "plan('limited.yaml', readings=60, criterion='U5-maximum')",
+        "run(load('splines.yaml', 'plain'))",
+        "run(load('splines.yaml', 'tensor'))",
+        "fit(x := load('splines.yaml', 'tensor'), simulate(x))",
     )
 )
 

@@ -166,7 +166,10 @@ def acted(line: str, folder: Path) -> tuple[int, str, str]:
                 shown = eval(line.removeprefix(PYTHON), {k: getattr(bp, k) for k in dir(bp)})
             except (ValueError, TypeError, ExperimentError) as error:
                 shown = f"{type(error).__name__}: {error}"
-        return 0, json.dumps(as_data(shown), indent=1, default=str), ""
+        texts = [repr(shown), *(shown.lines() if hasattr(shown, "lines") else ())]
+        texts += [shown.to_frame().to_csv()] if hasattr(shown, "to_frame") else []
+        data = shown.to_dict() if isinstance(shown, bp.Result) else as_data(shown)
+        return 0, json.dumps(data, indent=1, default=str), "\n".join(texts)
     name, rest = line.removeprefix(STUDIO).split(" ", 1)
     view, _, data = rest.partition(" {")
     action, document = json.loads(f"{{{data}"), opened(folder / name)

@@ -35,8 +35,8 @@ def length_factor(unit: str, power: int = 1) -> Fraction:
 
     >>> length_factor(r"\milli\metre"), length_factor(r"\micro\metre\tothe{2}", 2)
     (Fraction(1, 1000), Fraction(1, 1000000000000))
-    >>> [float(length_factor(one + r"\metre")) for one in (r"\kilo", r"\deci", r"\centi", r"\pico")]
-    [1000.0, 0.1, 0.01, 1e-12]
+    >>> [f"{float(length_factor(one)):g}" for one in (f"\\{name}\\metre" for name in PREFIXES)]
+    ['1000', '100', '10', '0.1', '0.01', '0.001', '1e-06', '1e-09', '1e-12']
     """
     factor, exponent, prefix, start = Fraction(1), 0, 0, 0
     last = Fraction(1)
