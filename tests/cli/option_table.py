@@ -247,9 +247,22 @@ TABLES = (
 # a gross error, those in `off.csv` errors that the model has not.
 EFFECTS = "effects.yaml effects.csv"
 LIMITED = "plan limited.yaml --workers 1"
-REPORTS = ("dmis_inch.dmo", "dmis_points.dmo", "qif_3_0.qif", "pcdmis_inch.txt", "calypso_chr.txt")
-EXPORTS = ("axes-en.csv", "merged-en.csv", "programma-it.txt")
-READINGS = ("inches", "index", "part", "shuffled", "swapped")
+REPORTS = ("dmis_inch.dmo", "dmis_points.dmo", "dmis_mm.dmo", "qif_3_0.qif", "qif_2_1_inch.qif")
+REPORTS += ("pcdmis_inch.txt", "pcdmis_mm.txt", "calypso_chr.txt", "calypso_fet.txt")
+EXPORTS = ("axes-en.csv", "merged-en.csv", "programma-it.txt", "hoja-es.csv", "plain.csv")
+EXPORTS += ("kalkylblad-sv.csv", "program-en.txt", "programm-de.txt", "spreadsheet-de.csv")
+READINGS = (
+    "inches",
+    "index",
+    "part",
+    "shuffled",
+    "swapped",
+    "centres",
+    "german",
+    "missing",
+    "wide",
+)
+ABOUT = "--about date=2026-11-02 --about country=DE"
 LINES = (
     "run effects.yaml --trials 4 --seed 2 --workers 1 --json",
     "run effects.yaml --assumptions --report out.html",
@@ -265,16 +278,12 @@ LINES = (
     f"{LIMITED} --positions 5 --curve --sheet out.html --plot out.svg -o out.yaml",
     f"{LIMITED} --positions 3 --criterion A --json",
     "next limited-plan.yaml begun-limited.csv",
-    "check lost.yaml --json",
+    *("check lost.yaml --json", "'run --errors' lost.yaml", "'run --reliability' lost.yaml"),
     "fit lost.yaml lost.csv --report out.html",
-    "'run --errors' lost.yaml",
-    "'run --reliability' lost.yaml",
-    "compare pair.yaml --trials 2 --points 5",
-    "run plate.yaml --trials 5 --workers 1 --json",
+    *("compare pair.yaml --trials 2 --points 5", "run plate.yaml --trials 5 --workers 1 --json"),
     "fit small.yaml off.csv --report out.html --plot out.svg",
     "validate small.yaml off.csv --json",
-    "fit small.yaml wrong-small.csv --report out.html",
-    "fit small.yaml wrong-small.csv --json",
+    *(f"fit small.yaml wrong-small.csv {more}" for more in ("--report out.html", "--json")),
     "fit tables.yaml tables-again.csv --report out.html",
     "diff tables.yaml tables.yaml --readings tables-readings.csv tables-again.csv --grid 2",
     *(f"import samples/{name} --for samples/campaign.yaml -o -" for name in REPORTS),
@@ -292,9 +301,9 @@ LINES = (
     *(
         "run certified/weak.yaml --json",
         "check certified/weak.yaml",
-        "fit certified/weak.yaml certified/weak.csv --report out.html",
         "run certified/deficient.yaml",
     ),
+    "fit certified/weak.yaml certified/weak.csv --report out.html",
     "'run --budget' effects.yaml effects.csv --by position --json",
     *("map gec-like.yaml --budget --grid 2,2,2", "'map --curves' gec-like.yaml --json"),
     *(
@@ -311,10 +320,7 @@ LINES = (
             ("models", " shifted.csv"),
             ("certificate", " shifted.csv --plate few -o out.html"),
             ("next", " shifted.csv --json"),
-            (
-                "certificate",
-                " shifted.csv --plate large --sigma given -o out.xml --about date=2026-11-02 --about country=DE",
-            ),
+            ("certificate", f" shifted.csv --plate large --sigma given -o out.xml {ABOUT}"),
             ("reach", " --by certificate --target '1 um'"),
             ("compare", " --trials 2 --points 5"),
         )
@@ -343,6 +349,10 @@ LINES = (
     ),
     "compare dummy.yaml --variant 'with scale' --pairs braced",
     "check --suggest certified/weak.yaml",
+    *(f"check --suggest {name}.yaml" for name in ("bar-bell", "bryan-gauge", "angles", "limited")),
+    *(f"check --suggest --format {form} deficient.yaml" for form in ("github", "junit", "json")),
+    *("sheet tables.yaml -o out.html", "sheet angles.yaml --variant 'any angles' -o out.html"),
+    "fit small.yaml wrong-small.csv -o new.yaml",
     "check --suggest --json small.yaml --goal 'U6 average 0.3 um'",
     "sweep reasons.yaml --workers 1",
     "reach limited.yaml --by hours --target '3 um'",
@@ -394,6 +404,13 @@ JOINED = {
         {"kind": "sag", "artefact": "large", "value": "1 um", "standard_uncertainty": "0.4 um"},
     ],
 }
+UNKNOWN = {"offset": ["60 mm", "0 mm", "0 mm"], "unknown": True}
+AT_ONE_POINT = {"down": ["0 mm", "0 mm", "0 mm"]}
+CORNER = {"x": "50 mm", "y": "50 mm"}
+FLAT = [
+    {"name": f"at {z}", "plane": "z", "level": f"{z} mm", "corner": CORNER, "probes": ["down"]}
+    for z in (100, 300)
+]
 # Expressions of Python with the names of the package.
 PYTHON = "python: "
 EXPRESSIONS = tuple(
@@ -426,6 +443,47 @@ EXPRESSIONS = tuple(
         *(f"load('small.yaml').with_({{'positions[0].quarter_turns': {k}}})" for k in (90, -90)),
         "read_report('z-low.dmo', 'quickstart.yaml', unit='ft')",
         "budget('shifted.yaml', by='probe')",
+        *(
+            f"check(load('small.yaml').with_({change}), suggest=True)"
+            for change in (
+                {"calibration": [], "probes.right": UNKNOWN},
+                {f"positions[{k}].probes": ["down"] for k in (2, 4)},
+                {"error_model": {"kind": "metric"}, "probes": AT_ONE_POINT, "positions": FLAT},
+                {"calibration[0].pairs": "corners", "positions": FLAT},
+            )
+        ),
+        *(
+            f"fit('small.yaml', simulate('small.yaml').assign({change}))"
+            for change in (
+                "x_mm=lambda t: t.x_mm * (1 + 2e-5 * (t.position == 'high'))",
+                "y_mm=lambda t: t.y_mm + 0.004 * (t.probe == 'right')",
+                "z_mm=lambda t: t.z_mm + 0.003 * (t.position == 'low') * (t.ball == 'r2c2')",
+                "x_mm=lambda t: t.x_mm + 4e-5 * t.index",
+                "y_mm=lambda t: t.y_mm + 1e-5 * t.x_mm",
+                "z_mm=lambda t: t.z_mm + 2e-8 * t.x_mm**2 * (t.z_mm > 200)",
+                "x_mm=lambda t: t.x_mm + 0.003 * (t.index > 40)",
+            )
+        ),
+        "run(load('small.yaml').with_({'priors': [{'kind': 'map', 'file': 'suspect.yaml'}]}))",
+        *(
+            f"load('small.yaml').with_({{{key!r}: 1}})"
+            for key in ("calibration[corners].pairs", "positions[hihg].level", "seed[2]", "seeed")
+        ),
+        *(f"compare_models('{name}.yaml', '{name}.csv')" for name in ("lost", "effects")),
+        "fit('small.yaml', simulate('small.yaml').rename(columns=lambda n: n.replace('_mm', '_m')))",
+        "page('shifted.yaml')",
+        "page(fit('small.yaml', 'off.csv'))",
+        "page(validate('small.yaml', 'wrong-small.csv'))",
+        "service('sheet_questions')()",
+        *(
+            f"service('sheet_draft')(Path('x.yaml'), {answers})"
+            for answers in (
+                {},
+                {"machine_type": "gantry", "volume": "2 x 1 x 0.5 m", "tips": "one", "hours": "4"},
+                {"plate": "3 x 9, 200 mm", "certificate": "none", "target": "2 um + L/1"},
+                {"machine_type": "horizontal arm", "temperature": "0.5 K", "mpe": "3 um + L/200"},
+            )
+        ),
         *(f"{name}('effects.yaml')" for name in ("assumptions", "budget", "sheet", "reliability")),
         *(f"{name}('small.yaml', 'off.csv')" for name in ("fit", "validate", "compare_models")),
         "diff('shifted-map.yaml', 'again.yaml', grid=2)",

@@ -17,10 +17,7 @@ import yaml
 from ballplate.cli import main
 from ballplate.extensions.ci.github import annotation_lines, in_message, in_property
 from ballplate.extensions.ci.junit import junit_report
-from ballplate.extensions.repair.repair_search import repairs
-from ballplate.extensions.repair.repairs import Repairs
 from ballplate.planning.checked_files import CheckedFile
-from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import Message
 
 from tests.cli import wording
@@ -228,56 +225,6 @@ def test_a_junit_report_is_well_formed_for_any_text() -> None:
     told = str(message).replace("\ufffe", "").replace("\uffff", "")
     assert error is not None and error.get("message") == told
     assert junit_report([])
-
-
-@pytest.fixture
-def found_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Repairs of designs of the same name are looked for once."""
-
-    def repairs_of(experiment: Experiment, report: Any) -> Repairs:
-        if experiment.label not in known:
-            known[experiment.label] = repairs(experiment, report)
-        return known[experiment.label]
-
-    known: dict[str, Repairs] = {}
-    monkeypatch.setattr("ballplate.extensions.repair.repair_search.repairs", repairs_of)
-
-
-def test_suggestions_in_every_format(
-    folder: Path, found_once: None, capsys: pytest.CaptureFixture[str]
-) -> None:
-    def told(*options: str, status: int = 1) -> str:
-        assert run("check", "--variant", "B", "--variant", "C", *options, "wrong.yaml") == status
-        return capsys.readouterr().out
-
-    lines = told("--suggest").splitlines()
-    repairs_told = [line for line in lines if line.startswith("repair ")]
-    # What is told without suggestions stays as it is, and nothing is suggested where nothing is
-    # open.
-    assert [line for line in lines if line not in repairs_told] == told().splitlines()
-    assert repairs_told[0].startswith("repair 1: turn position ") and "full rank" in repairs_told[0]
-    assert sum("in the file: " not in line for line in repairs_told) == 2
-
-    bad, good = json.loads(told("--json", "--suggest"))
-    suggested = bad.pop("repairs")
-    assert good.pop("repairs") is None and [bad, good] == json.loads(told("--json"))
-    assert [one["rank_deficiency"] for one in suggested] == [0, 0]
-    assert [one["changes"][0]["kind"] for one in suggested] == ["move", "read"]
-    assert suggested[0]["edits"][0]["path"].startswith("positions[")
-    assert 1e-7 < suggested[0]["average_U6"] < 1e-6
-
-    error, *as_expected = told("--format", "github", "--suggest").splitlines()
-    assert as_expected and "repair" not in "".join(as_expected)
-    assert "%0Arepair 1: turn position " in error
-    failure = ElementTree.fromstring(told("--format", "junit", "--suggest")).find(".//failure")
-    assert failure is not None and "\nrepair 1: turn position " in (failure.text or "")
-
-    # A deficiency that is expected is no error, and repaired all the same.
-    text = (folder / "wrong.yaml").read_text(encoding="utf-8")
-    (folder / "wrong.yaml").write_text(text.replace("deficiency: 1", "deficiency: 2"), "utf-8")
-    lines = told("--format", "github", "--suggest", status=0).splitlines()
-    assert sum("wrong[B]" in line for line in lines) == len(repairs_told) + 1
-    assert all(line.startswith("as expected: wrong.yaml: wrong[") for line in lines)
 
 
 def described(name: str) -> Any:

@@ -131,15 +131,6 @@ def quickstart_readings(folder: Path, *options: str) -> tuple[Path, list[str]]:
     return path, path.read_text(encoding="utf-8").splitlines()
 
 
-def test_fit_of_readings_in_another_unit(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
-    readings, lines = quickstart_readings(tmp_path)
-    readings.write_text("\n".join([lines[0].replace("_mm", "_m"), *lines[1:]]), encoding="utf-8")
-    assert run("fit", QUICKSTART, readings) == 3
-    assert wording.FAR_OUTSIDE_THE_VOLUME in capsys.readouterr().err
-
-
 def test_nothing_is_made_of_a_failed_estimate(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -26,7 +26,7 @@ from ballplate.extensions.studio.jobs import JOBS
 from ballplate.extensions.studio.judging import VIEWS, judgement
 from ballplate.presentation import as_data
 from ballplate.simulator.computing import unreported
-from ballplate.simulator.inputs import ExperimentError
+from ballplate.simulator.inputs import ExperimentError, service
 from matplotlib.figure import Figure
 
 from tests.cli.option_table import KEPT, LIMITED, PYTHON, READING, STUDIO, TABLE, TABLES
@@ -105,6 +105,7 @@ def filled(folder: Path) -> Path:
         ["fit", "shifted.yaml", "shifted.csv", "-o", "shifted-map.yaml", "--date", "2026-11-22"],
         folder,
     )
+    outcome(["fit", "small.yaml", "wrong-small.csv", "-o", "suspect.yaml"], folder)
     for name, source, rows in (
         ("begun", "planned-readings", 7),
         ("begun-limited", "limited-plan", 20),
@@ -156,6 +157,9 @@ def stamps(folder: Path) -> dict[Path, tuple[int, int]]:
     return {path: (one.st_mtime_ns, one.st_ino) for path, one in found.items()}
 
 
+NAMES = {"Path": Path, "service": service, **{name: getattr(bp, name) for name in dir(bp)}}
+
+
 def acted(line: str, folder: Path) -> tuple[int, str, str]:
     """The value of an expression; or the text of a design after an action of the studio, its
     judgement, and a view of it.
@@ -163,11 +167,12 @@ def acted(line: str, folder: Path) -> tuple[int, str, str]:
     if line.startswith(PYTHON):
         with contextlib.chdir(folder):
             try:
-                shown = eval(line.removeprefix(PYTHON), {k: getattr(bp, k) for k in dir(bp)})
+                shown = eval(line.removeprefix(PYTHON), NAMES)
             except (ValueError, TypeError, ExperimentError) as error:
                 shown = f"{type(error).__name__}: {error}"
-        texts = [repr(shown), *(shown.lines() if hasattr(shown, "lines") else ())]
-        texts += [shown.to_frame().to_csv()] if hasattr(shown, "to_frame") else []
+        texts = ["--file lines", repr(shown)]
+        texts += shown.lines() if hasattr(shown, "lines") else ()
+        texts += ["--file frame", shown.to_frame().to_csv()] if hasattr(shown, "to_frame") else []
         data = shown.to_dict() if isinstance(shown, bp.Result) else as_data(shown)
         return 0, json.dumps(data, indent=1, default=str), "\n".join(texts)
     name, rest = line.removeprefix(STUDIO).split(" ", 1)

@@ -52,7 +52,6 @@ ESTIMATORS_OF_DISTANCES_ALONE_CANNOT_FOLLOW = (
 ESTIMATOR_DISTANCES_LENGTHS_OF_STANDARDS_AGAINST = (
     "estimator distances (12 lengths of standards) against"
 )
-FAR_OUTSIDE_THE_VOLUME = "far outside the volume; check the unit"
 FINISHED_CELLS_ARE_IN_NEW_SQLITE = "finished cases are in new.sqlite"
 FITS_THE_PROBE_LEFT = "fits the probe left, not right; correct the name of the probe"
 FROM_DEGREES_OF_FREEDOM_IS_ITSELF = "from 6 degrees of freedom is itself uncertain by 29 %; "
