@@ -331,6 +331,15 @@ LINES = (
     ),
     *(f"import {name} --for shifted.yaml -o -" for name in ("large-low.dmo", "sets.qif")),
     *(f"fit small.yaml {name}.csv" for name in ("numbers", "disordered", "two-tables")),
+    *(
+        f"fit small.yaml {name}.csv"
+        for name in ("no-ball", "no-axis", "no-heads", "words", "twice")
+    ),
+    *(
+        "next small.yaml first.csv",
+        "validate small.yaml first.csv",
+        "sweep variants.yaml --workers 1",
+    ),
     *("simulate shifted.yaml -o -", "check --no-modules effects.yaml"),
     "fit small.yaml two-tables.csv --columns 'x=X mm,y=Y mm'",
     *(f"map shifted-machine.yaml {more}" for more in ("--grid 2,2,2 --budget", "--draw 2")),
@@ -406,6 +415,8 @@ JOINED = {
 }
 UNKNOWN = {"offset": ["60 mm", "0 mm", "0 mm"], "unknown": True}
 AT_ONE_POINT = {"down": ["0 mm", "0 mm", "0 mm"]}
+SIZED = "load('small.yaml').with_({'artefacts.plate.size[0]': '%s'})"
+UNKNOWNS = ("size", "repeatability", "repeats", "certificate", "offsets", "thermometers")
 CORNER = {"x": "50 mm", "y": "50 mm"}
 FLAT = [
     {"name": f"at {z}", "plane": "z", "level": f"{z} mm", "corner": CORNER, "probes": ["down"]}
@@ -471,6 +482,13 @@ EXPRESSIONS = tuple(
         ),
         *(f"compare_models('{name}.yaml', '{name}.csv')" for name in ("lost", "effects")),
         "fit('small.yaml', simulate('small.yaml').rename(columns=lambda n: n.replace('_mm', '_m')))",
+        *(f"fit({SIZED % side}, 'small-readings.csv')" for side in ("270 mm", "299 mm", "3 m")),
+        "compare_models('small.yaml', 'small-readings.csv', coefficients=12)",
+        "check('lost.yaml', goals=['U6 average 1 um', 'tasks', 'lengths', 'U1 maximum 1 um'])",
+        *(f"reach('small.yaml', unknowns={name!r}, target='0.35 um')" for name in UNKNOWNS),
+        "diff('suspect.yaml', 'map.yaml', dates=('2024-01-01', '2026-02-03'))",
+        "curves('shifted-map.yaml', points=4)",
+        *(f"correct('{name}.yaml', 'to-correct.csv')" for name in ("suspect", "map", "machine")),
         "page('shifted.yaml')",
         "page(fit('small.yaml', 'off.csv'))",
         "page(validate('small.yaml', 'wrong-small.csv'))",
@@ -517,4 +535,23 @@ EXPRESSIONS = tuple(
     )
 )
 
-KEPT = (*RECIPES, *LINES, *ACTIONS, *EXPRESSIONS)
+# What else is written as data.
+AS_DATA = (
+    "run",
+    "fit",
+    "plan",
+    "check",
+    "compare",
+    "next",
+    "reach",
+    "certificate",
+    "models",
+    "map",
+)
+AS_DATA += ("validate", "diff", "correct", "spline", "'run", "'map", "reproduce", "init", "sheet")
+AGAIN = tuple(
+    f"{line} --json"
+    for line in (*RECIPES, *LINES)
+    if line.split()[0] in AS_DATA and not {"--json", "--format", "hours"} & {*line.split()}
+)
+KEPT = (*RECIPES, *LINES, *ACTIONS, *EXPRESSIONS, *AGAIN)

@@ -110,6 +110,7 @@ def filled(folder: Path) -> Path:
         ("begun", "planned-readings", 7),
         ("begun-limited", "limited-plan", 20),
         ("partial", "small-readings", 64),
+        ("first", "small-readings", 10),
     ):
         lines = (folder / f"{source}.csv").read_text(encoding="utf-8").splitlines(True)[:rows]
         (folder / f"{name}.csv").write_text("".join(lines), encoding="utf-8")

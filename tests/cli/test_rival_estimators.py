@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +26,6 @@ from tests.cli import wording
 from tests.reference.small_quickstart import small_sections
 
 QUICKSTART = "designs/quickstart.yaml"
-COMPARED = ["compare", "designs/npl/6.2.7.yaml", "--variant", "5 x 5", "--trials", "4"]
 
 
 @pytest.mark.parametrize("estimator", ["distances", "cresto", "kruth"])
@@ -52,38 +50,6 @@ def test_fit(estimator: str, capsys: pytest.CaptureFixture[str], tmp_path: Path)
     # Distances hardly show the roll of X and what goes with it: there a rival is some ten times
     # less certain.
     assert 0.1 < np.sqrt(np.mean(np.square(np.array(differences) / sizes))) < 20
-    assert (
-        main(
-            ["fit", QUICKSTART, readings, "--estimator", estimator, "--monomials", "--pairs", "all"]
-        )
-        == 0
-    )
-    out = capsys.readouterr().out
-    assert (
-        wording.PAIRS_OF_BALLS_2 in out
-        and "EXX t^4" in out
-        and max(map(len, out.splitlines())) <= 180
-    )
-
-
-def test_compare(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(COMPARED) == 0
-    out, err = capsys.readouterr()
-    assert wording.PAIRS_OF_BALLS in out and "root mean square" in out
-    assert err == "" or wording.DATA_SETS_OF in err
-    assert main([*COMPARED, "--json"]) == 0
-    found = json.loads(capsys.readouterr().out)
-    assert (
-        found["trials"] == 4 and found["not_converged"] == [] and len(found["rms"]["values"]) == 4
-    )
-    row = np.array(re.findall(r"\nroot mean square +(.*)", out)[0].split(), float)
-    shares = [0.0, 0.05, 0.25, 0.5, 0.75, 0.95, 1.0]
-    expected = 1e6 * np.quantile(found["rms"]["values"], shares)
-    assert row == pytest.approx(expected, rel=0.01)
-    assert [float(share) for share in found["rms"]["quantiles"]] == shares
-    # More data sets add to those before.
-    assert main([*COMPARED[:-1], "2", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["rms"]["values"] == found["rms"]["values"][:2]
 
 
 def test_repeats_of_a_length_standard_are_not_mistaken_for_other_readings() -> None:

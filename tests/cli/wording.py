@@ -39,7 +39,6 @@ CANNOT_FOLLOW_AN_UNKNOWN_LENGTH = "cannot follow an unknown length (bar: length)
 CELLS_DONE_FAILED_OF_THEM_BEFORE = "6 cases, 4 done, 2 failed (2 of them before)"
 CORRECT_OR_REMOVE = "correct or remove it"
 CORRECT_THE_NAMES_OF_THE_BALLS = "correct the names of the balls"
-DATA_SETS_OF = "data sets of 6.2.7[5 x 5]"
 DID_YOU_MEAN = 'did you mean "position"?'
 DID_YOU_MEAN_3 = '--trails=5; did you mean "--trials"?'
 DIRECTIONS_ARE_TOO_MANY = (
@@ -86,8 +85,6 @@ ONLY_A_BRYAN_GAUGE_HAS = (
 )
 ONLY_THE_ARM_OF_DROOPS = "only the arm of MH1, MH2 droops"
 ORIGIN_BALL_AXIS_THROUGH_BALL = "(origin: ball 1, x axis through ball 2)"
-PAIRS_OF_BALLS = "62 pairs of balls"
-PAIRS_OF_BALLS_2 = "300 pairs of balls"
 PLANNED_BUT_NOT_READ_LOW = "planned but not read (1): z low: ball r1c1 with down"
 POSITION_LOW_THE_READINGS_FIT = (
     ": position y low: the readings fit the plate turned over; correct the names"
