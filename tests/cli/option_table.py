@@ -548,7 +548,7 @@ AS_DATA = (
     "models",
     "map",
 )
-AS_DATA += ("validate", "diff", "correct", "spline", "'run", "'map", "reproduce", "init", "sheet")
+AS_DATA += ("validate", "diff", "correct", "spline", "'run", "'map", "init", "sheet")
 AGAIN = tuple(
     f"{line} --json"
     for line in (*RECIPES, *LINES)
