@@ -497,7 +497,7 @@ EXPRESSIONS = tuple(
             f"service('sheet_draft')(Path('x.yaml'), {answers})"
             for answers in (
                 {},
-                {"machine_type": "gantry", "volume": "2 x 1 x 0.5 m", "tips": "one", "hours": "4"},
+                {"machine_type": "gantry", "volume": "2.1 x 1.3 x 0.7 m", "tips": "one"},
                 {"plate": "3 x 9, 200 mm", "certificate": "none", "target": "2 um + L/1"},
                 {"machine_type": "horizontal arm", "temperature": "0.5 K", "mpe": "3 um + L/200"},
             )
