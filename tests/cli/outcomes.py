@@ -1,8 +1,8 @@
-"""What commands print and write, kept as text: that of a line in full, of each option what it adds
-and what it takes away.
+"""What lines print and write, kept as text: that of a line in full, of each option what it adds and
+what it takes away.
 
-`python -m tests.cli.outcomes` writes the files of the folder `outcomes` anew; look at what changed
-before it is committed.
+`python -m tests.cli.outcomes` writes the files of the folder `outcomes` anew, with what a new line
+`$ ...` in one of them shows; look at what changed before it is committed.
 """
 
 from __future__ import annotations
@@ -134,7 +134,8 @@ def keep(outcomes: Mapping[str, Sequence[str]]) -> None:
         was = before.get(name, [])
         if len(was) == len(lines) and all(map(are_alike, lines, was)):
             lines = was
-        command = re.sub(r"\W+", "-", name.split("'")[1] if name[0] == "'" else name.split()[0])
+        first = name.split("'")[1] if name[0] == "'" else name.split()[0].rstrip(":")
+        command = re.sub(r"\W+", "-", first)
         text = texts.setdefault(command, "Written by `python -m tests.cli.outcomes`.\n")
         texts[command] = text + "\n".join([f"\n$ {name}", *lines, ""])
     for path in FOLDER.glob("*.txt"):
@@ -146,7 +147,8 @@ def keep(outcomes: Mapping[str, Sequence[str]]) -> None:
 if __name__ == "__main__":
     from tempfile import TemporaryDirectory
 
-    from tests.cli.test_options import every_outcome, filled
+    from tests.cli.shown import filled
+    from tests.cli.test_options import every_outcome
 
     with TemporaryDirectory() as place:
         keep(every_outcome(filled(Path(place) / "kit")))

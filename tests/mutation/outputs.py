@@ -12,9 +12,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from tests.cli.option_table import KEPT
 from tests.cli.outcomes import are_alike
-from tests.cli.test_options import filled, lines_of, written
+from tests.cli.shown import filled, lines_of, written
+from tests.cli.test_options import KEPT
 from tests.mutation.forks import change, in_fork, probed
 from tests.mutation.mutants import Mutant
 from tests.reference.copies import copy_tree
