@@ -74,6 +74,34 @@ def test_json_is_a_format(folder: Path, capsys: pytest.CaptureFixture[str]) -> N
         assert capsys.readouterr().out == ""
 
 
+def test_suggestions_are_the_same_in_every_format(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def told(*options: str, status: int = 1) -> str:
+        assert run("check", "--variant", "B", *options, "wrong.yaml") == status
+        return capsys.readouterr().out
+
+    lines = told("--suggest").splitlines()
+    repairs = [line for line in lines if line.startswith("repair ")]
+    # What is told without suggestions stays as it is.
+    assert repairs and [line for line in lines if line not in repairs] == told().splitlines()
+    bad = json.loads(told("--json", "--suggest"))
+    suggested = bad.pop("repairs")
+    assert bad == json.loads(told("--json"))
+    assert len(suggested) == sum("in the file: " not in line for line in repairs)
+    assert all(one["rank_deficiency"] == 0 for one in suggested)
+    escaped = told("--format", "github", "--suggest").replace("%25", "%")
+    failure = ElementTree.fromstring(told("--format", "junit", "--suggest")).find(".//failure")
+    for line in repairs:
+        assert f"%0A{line}" in escaped
+        assert failure is not None and f"\n{line}" in (failure.text or "")
+    # A deficiency that is expected is no error, and repaired all the same.
+    text = (folder / "wrong.yaml").read_text(encoding="utf-8")
+    (folder / "wrong.yaml").write_text(text.replace("deficiency: 1", "deficiency: 2"), "utf-8")
+    lines = told("--suggest", status=0).splitlines()
+    assert [line for line in lines if line.startswith("repair ")] == repairs
+
+
 def test_an_unknown_variant_is_an_error_in_every_format(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

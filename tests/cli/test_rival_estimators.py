@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+import ballplate as bp
 import numpy as np
 import pytest
 from ballplate import experiment as made_of
@@ -50,6 +51,16 @@ def test_fit(estimator: str, capsys: pytest.CaptureFixture[str], tmp_path: Path)
     # Distances hardly show the roll of X and what goes with it: there a rival is some ten times
     # less certain.
     assert 0.1 < np.sqrt(np.mean(np.square(np.array(differences) / sizes))) < 20
+
+
+def test_more_data_sets_add_to_those_before() -> None:
+    design = bp.load("designs/npl/6.2.7.yaml", "5 x 5")
+    few, more = (bp.compare(design, trials=trials).to_dict() for trials in (2, 4))
+    assert few["rms"]["values"] == more["rms"]["values"][:2]
+    assert more["trials"] == 4 and more["not_converged"] == []
+    for share, value in more["rms"]["quantiles"].items():
+        assert value == pytest.approx(np.quantile(more["rms"]["values"], float(share)))
+    assert len(more["rms"]["quantiles"]) == 7
 
 
 def test_repeats_of_a_length_standard_are_not_mistaken_for_other_readings() -> None:
