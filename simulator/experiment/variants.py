@@ -175,9 +175,9 @@ def _index(node: Sequence, step: str, above: tuple[str, ...]) -> int:
     if re.fullmatch(r"[0-9]{1,9}", step):
         if int(step) < len(node.items):
             return int(step)
-        raise ValueError(
-            f"there is no {format_path(above)}[{step}]; the indices are 0 to {len(node.items) - 1}"
-        )
+        last = len(node.items) - 1
+        indices = f"the indices are 0 to {last}" if node.items else "the list is empty"
+        raise ValueError(f"there is no {format_path(above)}[{step}]; {indices}")
     if not above:
         raise ValueError("the experiment is a list; write its sections, such as machine, as keys")
     names = [_name(item) for item in node.items]

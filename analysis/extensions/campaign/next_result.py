@@ -145,7 +145,7 @@ class NextStep(Result):
             return f"{reason}; no position is left to read"
         addition = self.next
         more = "rest of " if addition.name in self.read else ""
-        return f"{reason}; next: {more}{addition.name} ({addition.readings} readings)"
+        return f"{reason}; next: {more}{addition.name} ({number_of(addition.readings, 'reading')})"
 
     def _reason(self) -> str:
         if self.now is None or not self.now.is_met:

@@ -16,7 +16,7 @@ from ballplate.simulator.estimation import Linearisation, estimate, linearise, l
 from ballplate.simulator.machines import Array, Integers
 
 from .bias_patterns import patterns
-from .events import ASSUMED, SLIP, Cause, all_directions, cause, event_groups
+from .events import ASSUMED, Cause, all_directions, cause, event_groups
 from .hypotheses import CHAIN, PossibleCause, hypotheses
 from .remainders import HIDDEN, Columns, Explained, Leftover, leftover
 from .scatter import Scatter, log_chances, ratio, scatters, with_scatter
@@ -140,7 +140,7 @@ class Search:
     def log_p(self, square: float, dimensions: float, left: Leftover) -> float:
         """Return the logarithm of the p-value of a sum of squares in some `dimensions`."""
         total, freedom = left.sum_of_squares, left.freedom
-        if dimensions <= 0 or freedom - dimensions < 1:
+        if freedom - dimensions < 1:
             return 0.0
         rest = float(log_chance(total - square, total, freedom - dimensions, freedom, True))
         by_size = not self.estimated and rest > BELIEVED
@@ -329,12 +329,6 @@ class Search:
                     starts.append(other.start)
                 elif other != own:
                     others.setdefault(other, row)
-            if slip and self.patterns.kind[group[0, 0]] in SLIP:
-                here = self.patterns.subject[group[:, 0]] == slip.subjects[0]
-                if group.shape[1] == len(found.columns):
-                    best = explained.square[here].max() - APART * variance
-                    some = group[here & (explained.square >= best), 0]
-                    starts += self.patterns.start[some].tolist()
         found = replace(found, others=tuple(others.values()))
         return replace(found, first=min(starts), last=max(starts)) if slip else found
 

@@ -119,8 +119,8 @@ def _location_functions(x: Array) -> Array:
     order = np.argsort(x, kind="stable")
     location = np.zeros(len(x), np.int64)
     location[order] = np.cumsum(np.append(0, np.diff(x[order]) > SAME_PLACE))
-    if location.max(initial=0) < MOST_PLACES:
-        return np.eye(int(location.max(initial=0)) + 1)[location]
+    if location.max() < MOST_PLACES:
+        return np.eye(int(location.max()) + 1)[location]
     t = 0.5 * (_fractions(x[:, None])[:, 0] + 1.0)
     return np.cos(np.pi * np.arange(1, WAVES + 1) * t[:, None])
 

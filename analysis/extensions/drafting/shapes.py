@@ -12,7 +12,7 @@ from ballplate.simulator.experiment import Experiment
 from ballplate.simulator.geometry import AXIS_NAMES, corners
 from ballplate.simulator.machines import ARRANGEMENTS, Array
 
-from .machine_tables import arrangement_of, table
+from .machine_tables import table
 
 # Directions on the paper of the machine's x, y and z, for one metre; downwards is positive.
 VIEW = np.array([[0.86, 0.17], [0.48, -0.30], [0.0, -0.92]])
@@ -36,7 +36,7 @@ class Shape:
 
 def machine_shapes(kind: str) -> Iterator[Shape]:
     """Yield a kind of machine from back to front, and the letters of the axes of its parts."""
-    chain = ARRANGEMENTS[arrangement_of(kind, (1.0, 1.0, 1.0))]
+    chain = ARRANGEMENTS[table("kinds")[kind][0]]
     letters = []
     for axis, *box in table("boxes")[kind]:
         ends = np.array(box, float)

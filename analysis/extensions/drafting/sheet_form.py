@@ -12,7 +12,7 @@ from ballplate.simulator.machines import ARRANGEMENTS
 
 from .checked_draft import checked_draft
 from .data_sheet import READERS, DataSheet, data_sheet
-from .machine_tables import arrangement_of, chain_words, table
+from .machine_tables import chain_words, table
 from .shapes import draft_shapes, machine_shapes, on_paper
 from .sheet_values import function_text
 
@@ -25,7 +25,7 @@ def sheet_questions() -> list[dict[str, Any]]:
     """
     machines = []
     for name in (*table("kinds"), *ARRANGEMENTS):
-        chain = arrangement_of(name, (1.0, 1.0, 1.0))
+        chain = table("kinds").get(name, [name])[0]
         shapes = on_paper(machine_shapes(name)) if name in table("kinds") else []
         machines.append(
             {"value": name, "words": f"{chain}: {chain_words(chain)}", "shapes": shapes}

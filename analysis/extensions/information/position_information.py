@@ -222,7 +222,7 @@ def _unread(design: Design, position: int) -> Design:
     """Return a design without the readings of a position, whose pose stays a parameter."""
     readings, lengths = design.readings, design.of(Lengths)
     is_kept = readings.position != position
-    place = np.where(is_kept, np.cumsum(is_kept) - 1, -1)
+    place = np.cumsum(is_kept) - 1
     fewer = replace(design, readings=readings.select(np.flatnonzero(is_kept)))
     left = design.observed(lengths.select(is_kept[lengths.first]))
     return fewer.observed(*(kind.reread(design, place) for kind in left.observations))

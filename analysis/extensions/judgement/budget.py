@@ -276,7 +276,7 @@ def _some(places: Any) -> MeasuredPoints:
 
 def _ends(distances: Distances, k: int) -> str:
     assert distances.pairs is not None and isinstance(distances.places, MeasuredPoints)
-    ends = 1e3 * distances.places.points[distances.pairs[k]] + 0.0
+    ends = 1e3 * distances.places.points[distances.pairs[k]]
     return "from {} to {} mm".format(*(f"({', '.join(f'{v:.6g}' for v in end)})" for end in ends))
 
 

@@ -88,7 +88,7 @@ def first_adequate(fits: list[RungFit], is_given: bool) -> RungFit:
     """The model with the fewest parameters, of several in this order, that no larger one beats by
     a test or, if of another kind, by BIC; the largest if each is beaten.
     """
-    for place, fit in enumerate(fits):
+    for place, fit in enumerate(fits[:-1]):
         worse = fit.bic(is_given) - CLEARLY_WORSE
         is_beaten = fit.beaten(fits, is_given).chance < FALSE_STEP
         if not is_beaten and all(rival.bic(is_given) >= worse for rival in fits[place + 1 :]):

@@ -97,11 +97,7 @@ def _of_radii(design: Design, places: Array, rows: np.ndarray) -> Array:
         _, values, vh = svd(
             np.column_stack([away / size[:, None], np.ones(len(size))]), full_matrices=False
         )
-        if (
-            len(values) < points.shape[1] + 1
-            or len(points) <= len(values)
-            or values[-1] < FLAT * values[0]
-        ):
+        if len(points) <= len(values) or values[-1] < FLAT * values[0]:
             continue
         scatter = np.sqrt(((size - radius) ** 2).sum() / (len(points) - len(values)))
         uncertainty = scatter * np.sqrt(((vh[:, -1] / values) ** 2).sum())

@@ -32,10 +32,6 @@ class WrongOffsets:
     change: Array
     axes: tuple[int, ...] = ()
 
-    @property
-    def is_off(self) -> bool:
-        return len(self.probes) == 1 and not self.axes
-
     def words(self, design: Design) -> str:
         """What is wrong, of a sign or an exchange."""
         names = [design.probes.names[k] for k in self.probes]

@@ -122,7 +122,7 @@ def _rows(axes: Axes, groups: list[FigureGroup]) -> None:
             )
     axes.axvline(1.0, color=INK, linewidth=1.0, linestyle="--")
     axes.set_xlim(0.0, 1.05 * float(comparable(largest)))
-    axes.set_ylim(0.6 - len(groups), 0.6)
+    axes.set_ylim(0.6 - max(len(groups), 1), 0.6)
     axes.set_yticks([-k for k in range(len(groups))], [_short(group.kind) for group in groups])
     axes.grid(True, axis="x")
     axes.set_xlabel("|E_n|; without a change, about one in twenty exceeds 1")

@@ -41,10 +41,9 @@ def plate_differences(
             for side, numbers in zip((first, second), balls, strict=True)
         )
         places = first_balls.values.reshape(-1, d)
-        rotation, origin = fit_motion(second_balls.values.reshape(-1, d), places)
-        turned = second_balls.by(np.asarray(np.kron(np.eye(len(common)), rotation)))
-        shifted = turned.values + np.tile(origin, len(common))
-        second_balls = MappedValues(shifted, turned.root, turned.null, turned.size, turned.shared)
+        # What is shifted alone is the motion below.
+        rotation, _ = fit_motion(second_balls.values.reshape(-1, d), places)
+        second_balls = second_balls.by(np.asarray(np.kron(np.eye(len(common)), rotation)))
         moving = motions(places - places.mean(axis=0)).reshape(places.size, -1)
         remainder = ValueDifference(first_balls, second_balls, scatters).without(
             orthonormal(moving)

@@ -158,7 +158,7 @@ def _trace(trace: Trace, scale: _Scale) -> Html:
     runs = _runs(is_finite)
     if trace.kind == "dots":
         path = "".join(f"M{x[k]:g} {y[k]:g}h0" for run in runs for k in run)
-    elif trace.kind == "band" and trace.upper is not None:
+    elif trace.upper is not None:
         top = np.round(scale.y(trace.upper), 1).tolist()
         path = "".join(
             _line([x[k] for k in run], [y[k] for k in run])

@@ -10,7 +10,6 @@ import numpy as np
 from ballplate.simulator.computing import single_threaded
 from ballplate.simulator.design import Design, Flags, SharedLayout, rotation_sensitivity
 from ballplate.simulator.estimation import BallPlaces, Linearisation, displacements, linearise
-from ballplate.simulator.geometry import pose_size
 from ballplate.simulator.machines import Array, KinematicModel
 from ballplate.uncertainty import Quantity, pairs_of, summarise
 
@@ -52,10 +51,8 @@ def pose_rows(design: Design, layout: SharedLayout) -> Array:
     for k in design.posed_positions:
         columns = layout.pose_columns[k]
         by_rotation = rotation_sensitivity(-design.positions.origins[k][None])[0]
-        for axis in np.flatnonzero(columns[:d] >= 0):
-            for turn in range(pose_size(d) - d):
-                if columns[d + turn] >= 0:
-                    rows[columns[axis], columns[d + turn]] = by_rotation[axis, turn]
+        axes, turns = np.flatnonzero(columns[:d] >= 0), np.flatnonzero(columns[d:] >= 0)
+        rows[np.ix_(columns[axes], columns[d + turns])] = by_rotation[np.ix_(axes, turns)]
     return rows
 
 

@@ -113,9 +113,10 @@ def check_goal(goal: Goal, prediction: Prediction | PlannedUncertainty) -> None:
 
     :raises GoalError: no target, no tasks, or no such quantity.
     """
-    if goal.kind == "lengths" and (
-        "U6" not in prediction.quantities or prediction.quantities["U6"].within_target is None
-    ):
+    symbol = {"lengths": "U6", "quantity": goal.symbol}.get(goal.kind)
+    if symbol is not None and symbol not in prediction.quantities:
+        raise GoalError(f"the design has no {symbol}; it has {listing(prediction.quantities, 20)}")
+    if goal.kind == "lengths" and prediction.quantities["U6"].within_target is None:
         raise GoalError(
             'the file states no target_uncertainty; add it, such as "0.5 um + L/1000000", or give'
             " --target or --goal"
@@ -129,10 +130,6 @@ def check_goal(goal: Goal, prediction: Prediction | PlannedUncertainty) -> None:
                 f"no target for {listing(without)}; give target_uncertainty to tasks, or to the"
                 " file"
             )
-    if goal.kind == "quantity" and goal.symbol not in prediction.quantities:
-        raise GoalError(
-            f"the design has no {goal.symbol}; it has {listing(prediction.quantities, 20)}"
-        )
 
 
 def judge(goal: Goal, prediction: Prediction | PlannedUncertainty) -> Judgement:

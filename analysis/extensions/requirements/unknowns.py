@@ -313,7 +313,7 @@ def _several(texts: list[str]) -> str:
 
 
 def _repeats(experiment: Experiment, root: Node, artefact: str | None) -> Unknown:
-    """Return the number of repeats, or its multiple if repeats differ."""
+    """Return the number of repeats, or its multiple if repeats differ; all artefacts are placed."""
     places = [
         k
         for k, position in enumerate(experiment.positions)
@@ -328,8 +328,6 @@ def _repeats(experiment: Experiment, root: Node, artefact: str | None) -> Unknow
         for j, group in enumerate(experiment.positions[k].readings)
     ]
     counts = sorted({count for _, count in groups})
-    if not counts:
-        raise NotVariableError(f'"{artefact}" is never placed')
     is_same = len(counts) == 1
 
     def tree(step: int) -> Node:

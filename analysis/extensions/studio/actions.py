@@ -205,9 +205,10 @@ def _put(action: Action) -> Outcome:
     low, high = _free_motion(draft, place)
     if (low > high + STEP).any():
         k = int((low - high).argmax())
+        excess = length_text(round(float(low[k] - high[k]), 9))
         raise ActionError(
-            f"position {place.name} has no room along {AXES[k]}: its readings span"
-            f" {length_text(float(low[k] - high[k]))} more than the volume; choose a smaller plate"
+            f"position {place.name} has no room along {AXES[k]}: its readings span {excess} more"
+            " than the volume; choose a smaller plate"
         )
     if action.get("at") is not None:
         by = np.clip(action.vector("at") - _middle(draft, place), low, high)
@@ -258,8 +259,9 @@ def _fitted(action: Action) -> Outcome:
         excess = high[k] - low[k] - (highest - lowest)
         if (excess > 0.0).any():
             axis = int(excess.argmax())
+            span = length_text(round(float((high - low)[k, axis]), 9))
             raise ActionError(
-                f"position {enabled[k].name} takes {length_text(float((high - low)[k, axis]))}"
+                f"position {enabled[k].name} takes {span}"
                 f" along {AXES[axis]}, more than the volume; choose a smaller plate, or turn it"
             )
         by = fitted.machine.volume.lower + share[k] * is_free[k] - low[k]

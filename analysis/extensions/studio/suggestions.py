@@ -17,7 +17,7 @@ from ballplate.extensions.repair.written import Edit, position_settings
 from ballplate.presentation import Data, picked
 from ballplate.results import given_words, planned_uncertainty, predict
 from ballplate.simulator.computing import Report, counted, unreported
-from ballplate.simulator.experiment import Experiment, Position
+from ballplate.simulator.experiment import Experiment, Position, placed_only
 from ballplate.simulator.inputs import ExperimentError
 
 from .actions import done
@@ -79,7 +79,7 @@ def next_positions(
     candidates = []
     for change in counted(changes, "positions", len(changes), report):
         with suppress(ExperimentError):
-            planned = planned_uncertainty(changed(experiment, [change]))
+            planned = planned_uncertainty(placed_only(changed(experiment, [change])))
             if lengths := planned.quantities.get("U6"):
                 order = planned.deficiency, np.nan_to_num(lengths.average, nan=np.inf)
                 candidates.append((order, change, lengths))
@@ -89,12 +89,16 @@ def next_positions(
         if isinstance(position := candidate[1].item, Position):
             best.setdefault(_kind(experiment, position), candidate)
     before = hours_of(experiment)["hours"]
+    # No position may have the name of a group of candidates.
+    groups = {each.group for each in experiment.pool.candidates} if experiment.pool else ()
     shown = []
     for order, change, lengths in list(best.values())[:MOST_SHOWN]:
         settings = position_settings(experiment, change.item)
+        if settings["name"] in groups:
+            settings["name"] += " again"
         added = done(document, {"do": "add", "settings": settings})
         after = evaluable_of(added, planning=True)
-        given = given_words(predict(changed(experiment, [change])).qualifications)
+        given = given_words(predict(placed_only(changed(experiment, [change]))).qualifications)
         row = {
             "words": (change.words.partition(" again ")[2] or change.words) + given,
             "deficiency": order[0],

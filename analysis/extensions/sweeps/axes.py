@@ -17,6 +17,7 @@ from ballplate.simulator.inputs import (
     hint,
     listing,
     mark_of,
+    number_of,
     to_python,
     written,
 )
@@ -182,7 +183,10 @@ def _choices_together(
     count = lengths.pop() if lengths else 0
     names = list(settings.names or ())
     if names and len(names) != count:
-        problems.add((*here, "names"), f"{len(names)} names for {count} values; give one for each")
+        problems.add(
+            (*here, "names"),
+            f"{number_of(len(names), 'name')} for {number_of(count, 'value')}; give one for each",
+        )
         return []
     choices = []
     for k in range(count):

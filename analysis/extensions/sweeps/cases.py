@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from ballplate.presentation import shown_unit
 from ballplate.simulator.design import Flags
-from ballplate.simulator.inputs import QUANTITY, exact_number, in_one_line
+from ballplate.simulator.inputs import QUANTITY, exact_number, in_one_line, number_of
 from ballplate.simulator.machines import Array, Integers
 from ballplate.uncertainty import DESCRIPTIONS
 
@@ -103,7 +103,8 @@ class SweepCases:
         """Numbers of cases."""
         summary = self.summary
         remaining = f", {summary.left} left" if summary.left else ""
-        return f"{summary.cells} cases, {summary.done} done, {summary.failed} failed{remaining}"
+        cases = number_of(summary.cells, "case")
+        return f"{cases}, {summary.done} done, {summary.failed} failed{remaining}"
 
 
 def columns_of(

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import ballplate as bp
@@ -14,7 +12,7 @@ from ballplate.extensions.drafting.sheet_values import expanded, growing_length,
 from ballplate.simulator.inputs.quantities import LengthFunction
 
 from tests.extensions.drafting import wording
-from tests.extensions.drafting.sheets import BRIDGE, options
+from tests.extensions.drafting.sheets import BRIDGE, FLAT, options
 
 EXAMPLE = Path("designs/quickstart.yaml")
 
@@ -61,12 +59,6 @@ def test_refusals(
         assert told in str(error.value)
 
 
-def test_values_that_are_missing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    stated = {name: BRIDGE[name] for name in ("machine_type", "mpe", "certificate")}
-    assert main(["init", str(tmp_path / "m.yaml"), *options(stated)]) == 2
-    assert wording.LACKS_VALUES in capsys.readouterr().err
-
-
 def test_without_the_extension_the_example_is_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -110,28 +102,27 @@ def test_forms_of_certificates_and_plates() -> None:
 pty = pytest.importorskip("pty", reason="there is no pseudo-terminal")
 
 
-def at_terminal(folder: Path, *words: str, typed: str) -> tuple[int, str]:
-    """The status of `init` at a pseudo-terminal where all this is typed, and what it prints."""
+def at_terminal(monkeypatch: pytest.MonkeyPatch, *words: str, typed: str) -> int:
+    """The status of `init` at a pseudo-terminal where all this is typed."""
     ours, theirs = pty.openpty()
     os.write(ours, typed.encode())
-    ended = subprocess.run(
-        [sys.executable, "-m", "ballplate", "init", *words],
-        stdin=theirs,
-        stdout=theirs,
-        stderr=subprocess.PIPE,
-        cwd=folder,
-        timeout=60,
-    )
-    os.close(theirs)
+    with os.fdopen(theirs) as read, os.fdopen(os.dup(theirs), "w") as write:
+        monkeypatch.setattr("sys.stdin", read)
+        monkeypatch.setattr("sys.stdout", write)
+        status = main(["init", *words])
     os.close(ours)
-    return ended.returncode, ended.stderr.decode()
+    return status
 
 
-def test_questions_at_a_terminal(tmp_path: Path) -> None:
+def test_questions_at_a_terminal(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     """Nonsense is answered at once and asked again; nothing typed is the default."""
+    monkeypatch.chdir(tmp_path)
     answers = ["bridge", "gantry", "", "", "6 x 6, 1300 mm", "5 x 5, 400 mm", "0.4 um", ""]
     typed = "\n".join([*answers, "star", "", "", "", "1", "4", ""])
-    status, told = at_terminal(tmp_path, "m.yaml", typed=typed)
+    status = at_terminal(monkeypatch, "m.yaml", typed=typed)
+    told = capsys.readouterr().err
     assert status == 0, told
     assert wording.TOO_SHORT.replace("2 h", "1.9 h") in told
     assert wording.UNKNOWN_MACHINE in told and wording.LARGER_THAN_THE_VOLUME in told
@@ -141,10 +132,22 @@ def test_questions_at_a_terminal(tmp_path: Path) -> None:
         and wording.NO_COVERAGE_FACTOR_OF_AN_ANSWER in told
     )
     assert "next: ballplate plan m.yaml --hours 4 -o m-chosen.yaml" in told
-    assert bp.load(tmp_path / "m.yaml").layouts["plate"].names[-1] == "r5c5"
+    assert bp.load("m.yaml").layouts["plate"].names[-1] == "r5c5"
 
 
-def test_the_end_of_the_answers(tmp_path: Path) -> None:
-    status, told = at_terminal(tmp_path, "m.yaml", typed="\x04")
-    assert status == 2 and wording.NO_ANSWER in told
+def test_in_two_dimensions_tips_are_no_question(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    typed = "\n".join(["", FLAT["volume"], "", FLAT["plate"], *[""] * 6, "\x04"])
+    assert at_terminal(monkeypatch, "m.yaml", typed=typed) == 0
+    assert "tips" not in capsys.readouterr().err
+    assert bp.load("m.yaml").dimension == 2
+
+
+def test_the_end_of_the_answers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert at_terminal(monkeypatch, str(tmp_path / "m.yaml"), typed="\x04") == 2
+    assert wording.NO_ANSWER in capsys.readouterr().err
     assert not list(tmp_path.iterdir())

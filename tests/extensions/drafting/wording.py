@@ -29,10 +29,6 @@ OUT_OF_REACH = (
     "the plate of 650 mm x 650 mm does not fit across x within the reach of the tips right, left,"
     " 780 mm x 1200 mm x 640 mm"
 )
-LACKS_VALUES = (
-    'the data sheet lacks values; add for example --volume "900 1200 700 mm" --plate'
-    ' "6 x 6, 420 mm"'
-)
 NO_ANSWER = "no answer for --machine-type; nothing is written"
 HALF_THE_MPE = "lengths of the corrected machine: half the MPE."
 TIPS_IN_TWO_DIMENSIONS = "tips star are not for a volume of two lengths"

@@ -6,18 +6,22 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from inspect import signature
 from typing import Any
 
 import ballplate as bp
 import numpy as np
 import pytest
 import scipy.stats
+from ballplate.extensions.judgement import compared_models as module
 from ballplate.extensions.judgement.compared_models import compared_models, first_adequate, fit_rung
 from ballplate.extensions.judgement.lack_of_fit import pure_error
 from ballplate.extensions.judgement.rungs import (
+    MOST_COEFFICIENTS,
     determined_rungs,
     empirical_rung,
     kinematic_rung,
+    rung_of_file,
     with_model,
 )
 from ballplate.simulator.design.arrays import nominal_state
@@ -356,3 +360,14 @@ def test_text_and_data_say_what_the_fits_say(sigma: Any, model: Any, words: str)
     figures = [2e6 * u6.maximum, 2e6 * u6.average]
     assert re.findall(r"([\d.]+) µm", line) == [f"{figure:#.3g}" for figure in figures]
     assert found.to_dict()["lengths"]["maximum"] == pytest.approx(u6.maximum, rel=1e-5)
+
+
+def test_the_command_tries_as_many_coefficients_as_python() -> None:
+    assert signature(bp.compare_models).parameters["coefficients"].default == MOST_COEFFICIENTS
+
+
+def test_a_file_that_explains_the_readings_is_not_searched(monkeypatch: pytest.MonkeyPatch) -> None:
+    experiment, observed = quickstart(), simulated(quickstart())
+    fit = fit_rung(experiment, observed, rung_of_file(experiment, observed.design.model))
+    monkeypatch.setattr(module, "diagnosed", None)
+    assert module._mistakes(fit, observed.x, is_given=True) == ()

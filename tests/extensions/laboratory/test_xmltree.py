@@ -103,6 +103,7 @@ def test_limits(monkeypatch: pytest.MonkeyPatch) -> None:
     deep = b"<a>" * DEEPEST + b"</a>" * DEEPEST
     assert len(list(parse_xml(deep, "f").walk())) == DEEPEST
     assert "more than 100 deep" in refusal(b"<a>" * 100_000)
+    assert "more than 50 MB" in refusal(bytes(50_000_001))
     monkeypatch.setattr(xmltree, "MOST_ELEMENTS", 3)
     parse_xml(b"<a><b/><b/></a>", "f")
     assert refusal(b"<a><b/><b/><b/></a>") == wording.MORE_THAN_ELEMENTS

@@ -12,6 +12,7 @@ import pytest
 from ballplate.extensions.maps.campaign_tests import (
     EstimatedSigma,
     joint_chance,
+    joint_difference,
     orthonormal,
     single_chances,
 )
@@ -147,3 +148,13 @@ def test_one_pair_in_twenty_is_changed_by_chance(
             f" {count}, {above / count:.2%} ({low:.2%} to {high:.2%})"
         )
     assert 0.04 <= above / count <= 0.06
+
+
+def test_a_difference_whose_uncertainty_is_rounding_is_not_tested():
+    known = EstimatedSigma(1.0, np.inf)
+    roots = np.diag([1.0, 1e-12]), np.zeros((2, 1))
+    test = joint_difference(np.array([2.0, 1e-6]), roots, (known, known))
+    assert test is not None
+    # That of the other alone: the square of two standard deviations.
+    assert (test.dimensions, test.statistic) == (1, pytest.approx(4.0))
+    assert test.p == pytest.approx(2.0 * norm.sf(2.0))

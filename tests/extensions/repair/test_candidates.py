@@ -10,9 +10,15 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ballplate.extensions.repair.candidates import candidates, moves, new_positions
+from ballplate.extensions.repair.candidates import (
+    candidates,
+    further_readings,
+    moves,
+    new_positions,
+)
 from ballplate.extensions.repair.changes import ChangeKind
 from ballplate.extensions.repair.search import change_pool
+from ballplate.extensions.repair.written import position_settings
 from ballplate.simulator.experiment.model import AtMost, Experiment
 from ballplate.simulator.machines import Array
 
@@ -102,6 +108,25 @@ def test_new_positions_are_those_of_their_words(experiment: Experiment) -> None:
         assert place.pose.rotation[axis, 0] == pytest.approx(1.0)
         of_plane = ("right",) if told[1] == "x" else ("down",)
         assert place.probes in (of_plane, ("down", "right"))
+
+
+@pytest.mark.parametrize("aside, is_offered", [(5.0, False), (9.0, True)])
+def test_a_new_probe_is_off_the_others_by_a_tenth_of_its_length(
+    aside: float, is_offered: bool, tmp_path: Path
+) -> None:
+    said = oblong() | {"probes": {"down": [f"{aside} mm", "0 mm", "-60 mm"]}}
+    for one in said["positions"]:
+        one["probes"] = ["down"]
+    found = further_readings(loaded(said, tmp_path))
+    assert ("minus z" in {one.probe.name for one in found if one.probe}) == is_offered
+
+
+def test_poses_are_written_as_in_the_file() -> None:
+    """None with an angle of minus zero."""
+    stated = plain(Path("designs/hurt_foss/bar-bell.yaml"), "length known")["positions"]
+    experiment = design("hurt_foss/bar-bell", "length known")
+    for one, place in zip(stated, experiment.positions, strict=True):
+        assert position_settings(experiment, place).get("pose", one["pose"]) == one["pose"]
 
 
 def test_no_position_is_moved_into_a_forbidden_box() -> None:

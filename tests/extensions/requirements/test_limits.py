@@ -11,6 +11,7 @@ from typing import Any
 import ballplate as bp
 import numpy as np
 import pytest
+from ballplate.extensions.requirements import root_search
 from ballplate.extensions.requirements.answers import Answer
 from ballplate.extensions.requirements.goals import Judgement, judge, parse_goal
 from ballplate.extensions.requirements.root_search import Tried, _scanned, _Searched, _Trials, reach
@@ -211,7 +212,11 @@ def test_goals_are_judged_by_what_is_predicted() -> None:
     ends = {"near": "100 mm", "far": "1 m"}.items()
     tasks = [{"name": k, "from": ["0 mm"] * 3, "to": [end, "0 mm", "0 mm"]} for k, end in ends]
     experiment = small_quickstart(evaluation=FEW["evaluation"] | {"tasks": tasks})
-    near, far = (task.standard_uncertainty for task in predict(experiment).tasks)
+    prediction = predict(experiment)
+    lengths = replace(prediction.quantities["U6"], undetermined=2)
+    found = judge(parse_goal("U6 average 1 um"), replace(prediction, quantities={"U6": lengths}))
+    assert not found.is_met and found.distance == pytest.approx(1e6 * lengths.average + 2.0)
+    near, far = (task.standard_uncertainty for task in prediction.tasks)
     for target, count in ((0.5 * (near + far), 1), (1.1 * far, 2)):
         planned = predict(experiment.with_({"target_uncertainty": f"{1e6 * target:.9f} um"}))
         u6 = planned.quantities["U6"]
@@ -228,3 +233,12 @@ def test_goals_are_judged_by_what_is_predicted() -> None:
             found = judge(parse_goal(goal, asked), planned)
             assert found.is_met is is_met and found.distance == pytest.approx(distance)
             assert found.words.startswith(words) and found.words.endswith(more)
+
+
+def test_numbers_of_balls_beyond_a_dozen_are_tried_a_quarter_apart() -> None:
+    square = {"kind": "square", "balls": 5, "size": "750 mm"}
+    experiment = small_quickstart(**FEW).with_({"artefacts.plate": square})
+    sought = unknown("balls", experiment, experiment.tree, None, None)
+    searched = _Searched(experiment.tree, experiment.builder, parse_goal("U6 average 1 um"))
+    tried = [sought.value(step) for step in root_search._probes(_Trials(sought, searched))]
+    assert tried == [*range(2, 13), 15, 19, 24, 30]

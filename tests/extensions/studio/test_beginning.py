@@ -76,7 +76,7 @@ def test_wrong_answers_are_reported_by_field(tmp_path, started):
     draft = page.post("/api/draft", json=answers).json()
     assert set(draft["messages"]) == {"volume", "hours", "name"} and "text" not in draft
     assert wording.IS_THERE_ALREADY in draft["messages"]["name"]
-    for name in ("", "../x.yaml", "x.txt", ".x.yaml", 7):
+    for name in ("", "../x.yaml", "x.txt", ".x.yaml", 7, 98 * "é" + ".yaml"):
         found = page.post("/api/draft", json={"name": name}).json()
         assert wording.IS_NOT_THE_NAME in found["messages"]["name"] and found["text"]
     action = {"do": "begin", "name": "there.yaml", "text": "title: y\n"}

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import asyncio
+import logging
 import sys
 from contextlib import suppress
 from pathlib import Path
 from threading import Thread
 
 import pytest
+from ballplate.extensions.studio.serving import _is_error
 
 from tests.extensions.studio.test_judging import begun
 
@@ -54,3 +57,9 @@ def test_no_traceback_of_an_answer_that_is_interrupted(
             process.kill()
     assert process.returncode == 130
     assert "interrupted" in told and "Traceback" not in told and "Error" not in told
+
+
+def test_an_answer_that_ends_with_the_studio_is_no_error() -> None:
+    for error in (None, ValueError(), KeyboardInterrupt(), asyncio.CancelledError()):
+        record = logging.makeLogRecord({"exc_info": error and (type(error), error, None)})
+        assert _is_error(record) == isinstance(error, ValueError | None)

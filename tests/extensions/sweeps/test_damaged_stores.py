@@ -102,6 +102,7 @@ def test_what_is_no_store_is_refused_in_one_line(
         out, err = capsys.readouterr()
         assert out == "" and err.count("\n") == 1
         assert_told_in_lines(err, store)
+        assert ("(format 1)" in err) == (name == "format 1")
     # What belongs to somebody else is left as it is.
     assert before == (store.read_bytes() if store.is_file() else b"")
     assert not [*store.parent.glob("table.*"), *store.parent.glob("report.*")]

@@ -11,8 +11,11 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import CancelledError
 from contextlib import suppress
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from ballplate.cli import main
@@ -136,6 +139,51 @@ def test_workers_with_other_code_are_refused(
 def test_a_worker_that_comes_later_computes_nothing_with_other_code() -> None:
     with pytest.raises(OtherVersionError):
         _on_worker(cluster.Bundle("", "", ()), "other", CellTask(0))
+
+
+def test_files_that_are_lost_are_sent_again_ten_times(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where all workers of a task end each time; four tasks for each thread are sent at once."""
+    sent = []
+
+    def result(number: int) -> int:
+        if number == 2:
+            raise CancelledError
+        return number
+
+    class Client:
+        status, loop, is_silent = "running", None, True
+        wait_for_workers = nthreads = lambda *_, **__: {"one": 1, "two": 1}
+
+        def scatter(self, what: list[str], broadcast: bool) -> list[str]:
+            sent.append(what)
+            return what
+
+        def run_on_scheduler(self, *_: object) -> None:
+            if self.is_silent:
+                raise OSError
+
+        def submit(self, _: object, bundle: str, code: str, task: CellTask, **how: Any) -> Any:
+            assert bundle == "files" and how == {"pure": False, "retries": 0}
+            answers = {"result": lambda: result(task.number), "release": lambda: None}
+            return SimpleNamespace(key=(task.number, len(sent)), **answers)
+
+    class Completed(list):
+        add = list.append
+
+        def __init__(self, first: list[Any], loop: None) -> None:
+            assert len(first) == 8
+            super().__init__(first)
+
+    monkeypatch.setattr("distributed.as_completed", Completed)
+    monkeypatch.setattr(cluster, "lost", lambda sweep, task: f"lost {task.number}")
+    client, tasks = Client(), [CellTask(k) for k in range(11)]
+    assert [*cluster._rows(client, None, "files", tasks)] == [0, 1, *range(3, 11), "lost 2"]
+    assert sent == 11 * [["files"]]
+    for status, is_silent in (("running", True), ("closed", False), ("running", False)):
+        client.status, client.is_silent = status, is_silent
+        assert cluster._is_there(client) == (status == "running" and not is_silent)
+    with pytest.raises(ClusterError, match="worker b has 2, and this is 1, and 1 more differ;"):
+        cluster._refuse({"a": "1", "b": "2", "c": "3"}, "1")
 
 
 def worker_processes(nannies: int) -> list[int]:

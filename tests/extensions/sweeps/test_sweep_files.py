@@ -159,66 +159,8 @@ def test_subsets_are_of_each_variants_own_list(written: Written, tmp_path: Path)
     ("text", "expected"),
     [
         (
-            "axes:\n  status: {path: seed, values: [1]}\n",
-            ["s.yaml:4:3: axes.status: is a column of every table"],
-        ),
-        (
-            "axes:\n  a: {path: seed, from: 1e-200, to: 1e200, count: 5, spacing: logarithmic}\n",
-            ["s.yaml:4:6: axes.a: the ends are too far apart"],
-        ),
-        (
             "axis: {a: {path: seed, values: [1]}}\n",
             ["s.yaml:1:1: axes: missing", "s.yaml:3:1: axis: unknown key"],
-        ),
-        (
-            "axes:\n  a: {path: artefacts.plat.size, values: [1]}\n",
-            ["s.yaml:4:6: axes.a: artefacts.plat.size: there is no"],
-        ),
-        (
-            "axes:\n  a: {path: seed}\n",
-            ["s.yaml:4:6: axes.a: has no values; give one of values, from … to …"],
-        ),
-        (
-            "axes:\n  a: {path: seed, values: [1], to: 5}\n",
-            ["s.yaml:4:32: axes.a.to: does not apply to values"],
-        ),
-        (
-            "axes:\n  a: {path: seed, from: 1, to: 5}\n",
-            ["s.yaml:4:6: axes.a: a range needs count or step;"],
-        ),
-        (
-            "axes:\n  a: {path: seed, from: 1, to: 9000000, step: 1}\n",
-            ["s.yaml:4:6: axes.a: the range has 9000000 values"],
-        ),
-        (
-            "axes:\n  a: {path: seed, values: [1, 2, 1]}\n",
-            ['s.yaml:4:6: axes.a: has the value "1" twice'],
-        ),
-        (
-            "axes:\n  a: {path: positions, subsets: {sizes: [9], always: [z lo]}}\n",
-            [
-                (
-                    's.yaml:4:55: axes.a.subsets.always[0]: no entry "z lo" in positions; did you'
-                    ' mean "z low"?'
-                ),
-                "s.yaml:4:42: axes.a.subsets.sizes[0]: no subset has 9 entries",
-            ],
-        ),
-        (
-            "axes:\n  a: {path: seed, values: [1]}\n  b: {path: seed, values: [1]}\n",
-            ['s.yaml:5:6: axes.b: seed overlaps seed of the axis "a"'],
-        ),
-        (
-            "axes:\n  a: {path: seed, values: [1]}\nskip: [{b: 1}]\n",
-            ['s.yaml:5:9: skip[0].b: there is no axis "b"'],
-        ),
-        (
-            "axes:\n  a: {path: seed, values: [1]}\nskip: [{a: 1}]\n",
-            ["s.yaml:5:7: skip: leaves no case"],
-        ),
-        (
-            "axes:\n  a: {path: seed, values: [1]}\nskip: [{a: {above: 1 mm}}]\n",
-            ['s.yaml:5:12: skip[0].a: "1 mm" cannot'],
         ),
         (
             "axes:\n"

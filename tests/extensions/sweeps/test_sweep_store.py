@@ -12,13 +12,13 @@ import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.extensions.sweeps import store_file
+from ballplate.extensions.sweeps import estimate, store_file, task
 from ballplate.extensions.sweeps.answer import answer
 from ballplate.extensions.sweeps.fingerprint import fingerprint
 from ballplate.extensions.sweeps.load import experiment_of, load_sweep
 from ballplate.extensions.sweeps.model import Sweep
 from ballplate.extensions.sweeps.store import definitions, keys, open_store, results
-from ballplate.extensions.sweeps.task import BLOCK, CellResult, CellTask, compute
+from ballplate.extensions.sweeps.task import CellResult, CellTask, compute
 from ballplate.montecarlo.experiments import trials
 from ballplate.results.checked_designs import predict
 from ballplate.simulator.experiment.loading import load
@@ -206,7 +206,7 @@ def test_replicates_in_blocks_are_the_same_replicates(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = small_sweep(tmp_path, 2, "trials: 520\nrecord: [U5]\n")
-    assert BLOCK % 512 == 0
+    assert task.BLOCK % 512 == 0
     monkeypatch.setattr("ballplate.extensions.sweeps.task.BLOCK", 512)
     assert sweep(path) == 1
     split = rows(tmp_path / "small.sqlite")
@@ -257,16 +257,18 @@ def test_a_fingerprint_tells_what_matters(
     assert (one != other) == differs
 
 
-def test_dry_run_lists_the_cells(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = small_sweep(tmp_path, 2)
-    assert sweep(path, "--dry-run") == 1
-    out, err = capsys.readouterr()
-    # The last of the cells that were tried does not fit.
-    assert "estimated from 3\ncase 3 fails: " in err
-    assert out.splitlines()[1] == "1: size 700 mm, balls 5" and len(out.splitlines()) == 4
-    assert (
-        re.match("4 cases, about [0-9.]+ (s|min)", err) and not (tmp_path / "small.sqlite").exists()
-    )
+def test_the_time_is_extrapolated(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where a case takes 1 s, and a data set 1 ms: all are computed in batches of 128."""
+
+    def timed(loaded: Sweep, task: CellTask) -> CellResult:
+        assert (loaded.trials or 0) % 128 == 0
+        status, seconds = "failed" if task.number == 7 else "done", 1 + 1e-3 * (loaded.trials or 0)
+        return CellResult(task.number, task.block, "", status, seconds=seconds)
+
+    monkeypatch.setattr(estimate, "compute", timed)
+    seconds, rows = estimate.seconds_of(load_sweep(small_sweep(tmp_path, 4, "trials: 1000\n")))
+    assert [row.number for row in rows] == [0, 3, 7]
+    assert seconds == pytest.approx(8 * (2 + 2 + 1) / 3)
 
 
 def test_export(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

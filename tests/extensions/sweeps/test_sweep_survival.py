@@ -12,16 +12,20 @@ import sqlite3
 import subprocess
 import time
 from collections.abc import Callable, Iterator
-from contextlib import closing, suppress
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import closing, nullcontext, suppress
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from ballplate.cli import main
+from ballplate.extensions.sweeps import local
 from ballplate.extensions.sweeps.execute import run_sweep
 from ballplate.extensions.sweeps.load import load_sweep
-from ballplate.extensions.sweeps.task import CellResult
+from ballplate.extensions.sweeps.task import CellResult, CellTask
 from ballplate.simulator.computing import ProgressStep
+from joblib.externals.loky.process_executor import TerminatedWorkerError
 
 from tests.cli.cuts import COMMIT, remains
 from tests.cli.test_outputs import BALLS, DESIGN
@@ -195,6 +199,27 @@ def test_a_worker_that_dies_each_time_fails_its_cell_alone(tmp_path: Path) -> No
     assert (
         wording.THE_PROCESS_THAT_COMPUTED_IT_WAS in done.stderr and "Traceback" not in done.stderr
     )
+
+
+def test_what_ends_each_process_is_tried_alone_twice(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Four by two workers after every third death."""
+    deaths, tried = [], list[int]()
+
+    def dying(*given: object, **how: object) -> Any:
+        deaths.append(len(tried))
+        raise TerminatedWorkerError
+
+    def submit(work: object, source: object, digest: str, task: CellTask) -> Any:
+        tried.append(task.number)
+        raise BrokenProcessPool
+
+    alone = SimpleNamespace(submit=submit)
+    monkeypatch.setattr(local, "in_processes", dying)
+    monkeypatch.setattr(local, "ProcessPoolExecutor", lambda *_, **__: nullcontext(alone))
+    monkeypatch.setattr(local, "lost", lambda sweep, task: f"lost {task.number}")
+    rows = local._in_workers(None, None, "", [CellTask(k) for k in range(5)], 2)
+    assert [*rows] == [f"lost {k}" for k in range(5)]
+    assert tried == [0, 0, 1, 1, 2, 2, 3, 3, 4, 4] and deaths[:6] == [0, 0, 0, 8, 8, 8]
 
 
 def test_one_writer_at_a_time_which_can_be_interrupted(
