@@ -30,6 +30,8 @@ BUILDS_ON = {
     ("campaign", "requirements"): "the next position is chosen for the goals of `reach`",
     ("judgement", "diagnosis"): "the residuals of each model are searched as those of a fit",
     ("certificates", "laboratory"): "both read XML",
+    ("certificates", "influences"): "a certificate states the temperature of its plate",
+    ("diagnosis", "influences"): "influences that are not stated are searched in readings",
     ("maps", "diagnosis"): "certificates in common act on fits as gross errors do",
     ("pages", "campaign"): "the page of a design has its run sheet",
     ("pages", "maps"): "the page of a design has its map of lengths",
@@ -150,7 +152,7 @@ def test_no_name_is_provided_twice() -> None:
 
 
 # What others build on.
-SOME = ("campaign", "laboratory", "maps", "diagnosis", "requirements")
+SOME = ("campaign", "influences", "laboratory", "maps", "diagnosis", "requirements")
 
 WITHOUT = """
 import sys
@@ -183,9 +185,9 @@ from ballplate.extensions import SHIPPED
 
 fit = bp.fit(bp.quickstart(), bp.simulate(bp.quickstart()))
 unsearched = [text for text in fit.warnings if "not looked for" in text]
-hidden = {"laboratory", "diagnosis"} & {*sys.argv[3:]}
+hidden = {"laboratory", "diagnosis", "influences"} & {*sys.argv[3:]}
 assert len(unsearched) == ("laboratory" in hidden) + bool(hidden), fit.warnings
-assert all("extension laboratory" in text or "extension diagnosis" in text for text in unsearched)
+assert all(any(f"extension {name}" in text for name in hidden) for text in unsearched)
 assert fit.converged and "<table" in fit._repr_html_() and "<table" in bp.check(quickstart)._repr_html_()
 with contextlib.suppress(SystemExit):
     main(["--help"])
@@ -219,6 +221,7 @@ OPTIONS = {
     "judgement": (["run", "designs/quickstart.yaml", "--budget"],),
     "campaign": (["plan", "POOL", "--positions", "6", "--sheet", "sheet.html"],),
     "laboratory": (["fit", "designs/quickstart.yaml", "designs/reports/z-low.dmo"],),
+    "influences": (["check", "tests/cli/files/effects.yaml"],),
     "sweeps": (["schema", "sweep"],),
     "maps": (["map", "designs/park/machines/npl-like.yaml", "--curves"],),
     "certificates": (

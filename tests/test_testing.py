@@ -19,7 +19,7 @@ from ballplate.testing import (
     check_observations,
 )
 
-from tests.influences.test_influence_checks import Long
+from tests.extensions.influences.test_influence_checks import Long
 from tests.observations.test_python_values import module
 
 

@@ -21,6 +21,20 @@ def _from(module: str, *names: str) -> dict[str, str]:
 
 SHIPPED = (
     _here(
+        "influences",
+        services=_from("campaign_temperatures", "campaign_temperatures"),
+        # In the order of the documentation.
+        influences={
+            "temperature": "temperature",
+            "probing": "probing",
+            "position scale": "position_scale",
+            "reproducibility": "reproducibility",
+            "re-indexing": "reindexing",
+            "drift": "drift",
+            "sag": "sag",
+        },
+    ),
+    _here(
         "assumptions",
         functions=_from("interface", "assumptions"),
         services=_from("effects", "assumption_effects"),

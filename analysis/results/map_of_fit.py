@@ -2,21 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.influences.temperature import (
-    ARTEFACT_COLUMN,
-    AXIS_COLUMNS,
-    SCALES_COLUMN,
-    TemperaturesSettings,
-)
 from ballplate.simulator.design.objects import Probes
 from ballplate.simulator.experiment.model_files import absolute
 from ballplate.simulator.inputs.days import parse_day
+from ballplate.simulator.inputs.extensions import service
 from ballplate.simulator.inputs.settings import listing, number_of
 from ballplate.simulator.inputs.yamltree import to_python, written
 from ballplate.simulator.maps.fit_verdict import LackOfFit
@@ -114,7 +108,11 @@ def map_of(fit: MappedFit, date: str | None = None) -> FittedMap:
         repeatability=design.machine.repeatability,
         coverage_factor=COVERAGE_FACTOR if factor is None else experiment.coverage_factor,
         frame=FRAMES.get(experiment.error_model.kind, ""),
-        temperatures=_temperatures(fit.observed, experiment),
+        temperatures=(
+            service("campaign_temperatures")(experiment.influences, design)
+            if experiment.influences
+            else None
+        ),
         left_out=tuple(
             _left_out(estimate) for estimate in fit.estimates if estimate.kind == "influence"
         ),
@@ -162,45 +160,6 @@ def counted_twice(experiment: Experiment | None, observed: ObservedReadings) -> 
         return tuple(prints)
     prior_digests = {digest for data in prior_data for digest in data.positions}
     return tuple(name for name, digest in prints.items() if digest in prior_digests)
-
-
-def _temperatures(observed: ObservedReadings, experiment: Experiment) -> dict[str, float] | None:
-    """Return the reference temperature and mean ones of scales and artefacts, over readings if they
-    have them, otherwise over positions.
-    """
-    stated = [
-        settings for settings in experiment.influences if isinstance(settings, TemperaturesSettings)
-    ]
-    if not stated:
-        return None
-    temperatures = {"reference": stated[0].reference}
-    columns_read = observed.design.readings.beside or {}
-    for word, columns in (
-        ("scales", (*AXIS_COLUMNS, SCALES_COLUMN)),
-        ("artefact", (ARTEFACT_COLUMN,)),
-    ):
-        values = [
-            column[np.isfinite(column)] for name, column in columns_read.items() if name in columns
-        ]
-        if not sum(map(len, values)):
-            values = [
-                np.atleast_1d(value)
-                for settings in stated
-                for value in _by_position(settings, word, observed.design.positions.names)
-            ]
-        if values:
-            temperatures[word] = float(np.concatenate(values).mean())
-    return temperatures
-
-
-def _by_position(settings: TemperaturesSettings, word: str, positions: Sequence[str]) -> list[Any]:
-    """Return stated temperatures of scales or artefacts in each position."""
-    measured = settings.scale_temperature if word == "scales" else settings.artefact_temperature
-    if measured is None:
-        return []
-    by_name = settings.positions or {}
-    temperatures = [getattr(by_name.get(name), word, None) for name in positions]
-    return [measured.value if value is None else value for value in temperatures]
 
 
 def left_out_words(fitted: FittedMap) -> str:

@@ -22,19 +22,14 @@ if TYPE_CHECKING:
         read_in_positions,
         reading_uncertainties,
     )
-    from .influences.displacements import SharedDisplacements
-    from .influences.drift import (
-        Drift,
-        even_clock,
-    )
     from .influences.protocol import (
         DesignParts,
         Disturbed,
+        Influence,
         InfluenceParameter,
         InfluenceSettings,
+        or_unknown,
     )
-    from .influences.sag import Sag, SagSettings
-    from .influences.temperature import TemperaturesSettings
     from .lookup import Indices, References
     from .objects import SLIGHTLY, Flags, Tasks, Volume
     from .observations.balls import BallObservations

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from .days import stated_day
     from .decoding import LINE_END, decoded, refuse_controls, text_and_encoding
     from .extensions import optional_service, service
+    from .faces import lazily as lazily
     from .messages import (
         MORE_ERRORS,
         MOST_MESSAGES,
@@ -48,6 +49,8 @@ if TYPE_CHECKING:
         QUANTITY,
         SMALLEST,
         CommonPart,
+        Duration,
+        Expansion,
         Length,
         LengthDrift,
         LengthFunction,
@@ -56,7 +59,11 @@ if TYPE_CHECKING:
         PositiveTemperatureDifference,
         QuantityError,
         Ratio,
+        RatioDrift,
         Target,
+        Temperature,
+        TemperatureDifference,
+        Units,
         exact_number,
         format_length,
         length_text,
@@ -72,7 +79,7 @@ if TYPE_CHECKING:
         plain_unit,
         typed_length,
     )
-    from .settings import Forms, NonEmpty, Settings, hint, listed, listing, number_of, shorten
+    from .settings import Forms, NonEmpty, Settings, Text, hint, listed, listing, number_of, shorten
     from .spreadsheets import CsvWriter, cell_of_text, text_of_cell
     from .tables import (
         MOST_COLUMNS,

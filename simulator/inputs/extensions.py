@@ -30,7 +30,7 @@ ENTRY_POINT = "ballplate.extensions"
 OF_FILES = ("artefacts", "calibrations", "error_models", "influences", "sections")
 KINDS = ("commands", "functions", "services", "schemas", *OF_FILES, "quantities")
 
-# Modules and tables of the kernel's names; the kernel has no services.
+# Modules and tables of the kernel's names; the kernel has no services and no influence quantities.
 _KERNEL_TABLES = {
     "commands": ("cli", "COMMANDS"),
     "functions": ("", "__all__"),
@@ -38,7 +38,6 @@ _KERNEL_TABLES = {
     "artefacts": ("simulator.geometry.artefacts", "ARTEFACTS"),
     "calibrations": ("simulator.design.observations.kinds", "KINDS"),
     "error_models": ("simulator.machines.settings", "KINDS"),
-    "influences": ("simulator.design.influences.kinds", "KINDS"),
     "sections": ("simulator.experiment.structure", "KEYS"),
     "quantities": ("uncertainty.kernel_quantities", "KERNEL_QUANTITIES"),
 }

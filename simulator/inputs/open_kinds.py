@@ -16,8 +16,8 @@ from .unusable import UnusableError
 
 @dataclass(frozen=True)
 class OpenKinds:
-    """Annotation of a union: values of `kind` that it lacks are looked up among names that
-    extensions provide under `provided`.
+    """Annotation of a union, or of `base` where the kernel has no kinds: values of `kind` that it
+    lacks are looked up among names that extensions provide under `provided`.
 
     `base` is the class of their settings; `form` returns the class that the union needs.
     """
@@ -47,9 +47,18 @@ class OpenKinds:
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        # The kernel's kinds are discriminated here, since a field would do so only afterwards.
-        of_kernel = handler.generate_schema(Annotated[source, Field(discriminator="kind")])
-        return core_schema.no_info_wrap_validator_function(self._validated, of_kernel)
+        # The kernel's kinds, if any, are discriminated here, since a field would do so only
+        # afterwards.
+        of_kernel = (
+            core_schema.tagged_union_schema({}, self.discriminator)
+            if source is self.base
+            else handler.generate_schema(Annotated[source, Field(discriminator="kind")])
+        )
+        # An empty union has nothing to write.
+        anything = core_schema.simple_ser_schema("any")
+        return core_schema.no_info_wrap_validator_function(
+            self._validated, of_kernel, serialization=anything
+        )
 
     def _validated(self, value: Any, of_kernel: Callable[[Any], Any]) -> Any:
         try:

@@ -17,7 +17,7 @@ from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import written_in_python
 from ballplate.simulator.experiment.model import Experiment
 
-from tests.influences.campaigns import Shares, assert_covered, shares_of
+from tests.extensions.influences.campaigns import Shares, assert_covered, shares_of
 from tests.reference.small_quickstart import small_sections
 
 NAMES = tuple(small_sections()["probes"])

@@ -9,7 +9,7 @@ import ballplate as bp
 import numpy as np
 import pandas as pd
 
-from tests.influences.test_temperature import STATED
+from tests.extensions.influences.test_temperature import STATED
 from tests.reference.small_quickstart import small_quickstart
 
 DRIFT = {"kind": "drift", "axes": {"standard_uncertainty": "2 um/h"}}

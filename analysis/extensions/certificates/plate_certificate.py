@@ -9,10 +9,10 @@ from itertools import combinations
 from pathlib import Path
 
 import numpy as np
+from ballplate.extensions.influences import TemperaturesSettings
 from ballplate.presentation import write_file
 from ballplate.results import Fit, data_of
 from ballplate.simulator.computing import blank, single_threaded
-from ballplate.simulator.design import TemperaturesSettings
 from ballplate.simulator.estimation import MICROMETRE, BallPlaces, Linearisation, displacements
 from ballplate.simulator.experiment import Experiment
 from ballplate.simulator.geometry import BallLayout, plate_axes

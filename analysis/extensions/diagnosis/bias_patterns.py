@@ -12,12 +12,11 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from ballplate.extensions.influences import Drift, even_clock
 from ballplate.simulator.design import (
     Design,
-    Drift,
     Lengths,
     State,
-    even_clock,
     expected_readings,
     length_directions,
     length_values,

@@ -7,15 +7,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from ballplate.simulator.design import (
-    Design,
+from ballplate.extensions.influences import (
     Drift,
     Sag,
     SagSettings,
     SharedDisplacements,
+    even_clock,
+)
+from ballplate.simulator.design import (
+    Design,
     State,
     disturbed_readings,
-    even_clock,
     expected_readings,
 )
 from ballplate.simulator.geometry import AXIS_NAMES

@@ -1,1 +1,1 @@
-"""Influence quantities: what disturbs readings in the laboratory, one file for each kind."""
+"""What an influence quantity has to be: its settings, its parameters and its effect on readings."""

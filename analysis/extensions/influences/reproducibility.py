@@ -11,14 +11,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Literal
 
+from ballplate.simulator.design import DesignParts, InfluenceSettings, References
+from ballplate.simulator.inputs import Length, NonEmpty, Steps
 from pydantic import Field
 
-from ...inputs.messages import Steps
-from ...inputs.quantities import Length
-from ...inputs.settings import NonEmpty
-from ..lookup import References
 from .displacements import Level, SharedDisplacements, displacements
-from .protocol import DesignParts, InfluenceSettings
 
 
 class ReproducibilitySettings(InfluenceSettings):
@@ -67,3 +64,6 @@ class ReproducibilitySettings(InfluenceSettings):
 def _words(names_by_level: Mapping[Level, str]) -> str:
     named = (f"ball {name}" if level == "ball" else name for level, name in names_by_level.items())
     return f"displacement of {', '.join(named)}"
+
+
+SETTINGS = ReproducibilitySettings

@@ -10,7 +10,6 @@ from typing import Any, ClassVar, Literal
 import ballplate as bp
 import numpy as np
 import pytest
-from ballplate.simulator.design.influences.kinds import INFLUENCES, once_each
 from ballplate.simulator.design.influences.protocol import (
     DesignParts,
     Disturbed,
@@ -20,8 +19,6 @@ from ballplate.simulator.design.influences.protocol import (
 )
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.inputs.messages import ExperimentError
-
-from tests.influences import wording
 
 
 @dataclass(frozen=True)
@@ -87,12 +84,3 @@ def test_what_is_wrong_is_told(changed: dict[str, Any], words: str) -> None:
         laid_out(**changed)
     assert "influences[0]: the class Odd: " in str(caught.value)
     assert words in str(caught.value)
-
-
-def test_each_kind_is_there_once() -> None:
-    class Again(InfluenceSettings):
-        kind: Literal["sag"]
-
-    once_each(INFLUENCES)
-    with pytest.raises(ExperimentError, match=wording.AGAIN_HAS_THE_KIND):
-        once_each((*INFLUENCES, Again))

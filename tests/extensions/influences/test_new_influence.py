@@ -13,12 +13,12 @@ import yaml
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 
-from tests.influences import wording
+from tests.extensions.influences import wording
 from tests.reference import dense
 from tests.reference.installed_extension import install, said_with
 from tests.reference.small_quickstart import small_sections
 
-TOP = Path(__file__).parents[2]
+TOP = Path(__file__).parents[3]
 UNCERTAINTY = 2e-5
 STYLI = {"kind": "styli", "value": "100 ppm", "standard_uncertainty": "20 ppm"}
 

@@ -20,8 +20,8 @@ from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.readings.reading_files import read_readings, write_readings
 from ballplate.simulator.readings.simulated import simulated_readings
 
-from tests.influences import wording
-from tests.influences.campaigns import (
+from tests.extensions.influences import wording
+from tests.extensions.influences.campaigns import (
     Real,
     dense_spread,
     file_with,

@@ -20,7 +20,7 @@ from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 
-from tests.influences.campaigns import (
+from tests.extensions.influences.campaigns import (
     Real,
     file_with,
 )

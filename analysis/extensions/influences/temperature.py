@@ -14,23 +14,29 @@ from fractions import Fraction
 from typing import Literal
 
 import numpy as np
-from pydantic import Field
-
-from ...geometry.ball_layouts import Name
-from ...inputs.messages import Steps
-from ...inputs.quantities import Expansion, Temperature, TemperatureDifference, Units
-from ...inputs.settings import Forms, NonEmpty, Settings
-from ...machines.protocol import Array, Unit
-from ..lookup import References
-from ..objects import Flags
-from .protocol import (
+from ballplate.simulator.design import (
     DesignParts,
     Disturbed,
+    Flags,
     Influence,
     InfluenceParameter,
     InfluenceSettings,
+    References,
     or_unknown,
 )
+from ballplate.simulator.geometry import Name
+from ballplate.simulator.inputs import (
+    Expansion,
+    Forms,
+    NonEmpty,
+    Settings,
+    Steps,
+    Temperature,
+    TemperatureDifference,
+    Units,
+)
+from ballplate.simulator.machines import Array, Unit
+from pydantic import Field
 
 REFERENCE = 20.0
 
@@ -428,3 +434,6 @@ def _one_by_one(settings: Iterable[tuple[Steps, object]]) -> Iterator[tuple[Step
             yield from (((*path, i), item) for i, item in enumerate(value))
         else:
             yield path, value
+
+
+SETTINGS = TemperaturesSettings

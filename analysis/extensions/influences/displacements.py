@@ -9,11 +9,15 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-
-from ...geometry.motions import AXIS_NAMES
-from ...machines.protocol import Array, Integers
-from ..objects import Readings
-from .protocol import DesignParts, Disturbed, Influence, InfluenceParameter
+from ballplate.simulator.design import (
+    DesignParts,
+    Disturbed,
+    Influence,
+    InfluenceParameter,
+    Readings,
+)
+from ballplate.simulator.geometry import AXIS_NAMES
+from ballplate.simulator.machines import Array, Integers
 
 Level = Literal["position", "probe", "ball"]
 

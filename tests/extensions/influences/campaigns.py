@@ -27,7 +27,7 @@ from tests.reference import dense
 from tests.reference.small_quickstart import small_sections
 
 Real = NDArray[np.float64]
-TOP = Path(__file__).parents[2]
+TOP = Path(__file__).parents[3]
 
 # What is added to the locations (m, d) of a design's readings, at scale readings x (m, d), by
 # parameters e (p,).

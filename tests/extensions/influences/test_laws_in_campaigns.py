@@ -21,10 +21,10 @@ from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.readings.simulated import simulated_readings
 from ballplate.uncertainty.quantities import QUANTITIES
 
-from tests.influences import test_drift as drift
-from tests.influences import test_sag as sag
-from tests.influences import test_temperature as temperature
-from tests.influences.campaigns import (
+from tests.extensions.influences import test_drift as drift
+from tests.extensions.influences import test_sag as sag
+from tests.extensions.influences import test_temperature as temperature
+from tests.extensions.influences.campaigns import (
     Law,
     Real,
     assert_covered,
@@ -34,7 +34,7 @@ from tests.influences.campaigns import (
     plain,
     told_on_page,
 )
-from tests.influences.test_position_effects import EVERY
+from tests.extensions.influences.test_position_effects import EVERY
 from tests.reference import dense
 
 

@@ -11,22 +11,19 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from pydantic import Field
-
-from ...geometry.ball_layouts import Name
-from ...inputs.messages import Steps
-from ...inputs.quantities import Length
-from ...inputs.settings import NonEmpty, hint
-from ...machines.protocol import Array, Integers
-from ..lookup import References
-from .protocol import (
+from ballplate.simulator.design import (
     DesignParts,
     Disturbed,
     Influence,
     InfluenceParameter,
     InfluenceSettings,
+    References,
     or_unknown,
 )
+from ballplate.simulator.geometry import Name
+from ballplate.simulator.inputs import Length, NonEmpty, Steps, hint
+from ballplate.simulator.machines import Array, Integers
+from pydantic import Field
 
 # Offsets shorter than this, in metres, point nowhere.
 SHORTEST = 1e-6
@@ -134,3 +131,6 @@ class Probing(Influence):
         rows = np.flatnonzero(self.place[at.probe] >= 0)
         derivative[rows, :, self.place[at.probe[rows]]] = along[rows]
         return self.listed[0].value * along, derivative
+
+
+SETTINGS = ProbingSettings

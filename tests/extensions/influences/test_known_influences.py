@@ -12,8 +12,8 @@ from ballplate.presentation.formatting import amount_of, number
 from ballplate.results.checked_designs import check, predict
 from ballplate.simulator.experiment.layout import lay_out
 
-from tests.influences import wording
-from tests.influences.campaigns import Real, dense_spread, file_with
+from tests.extensions.influences import wording
+from tests.extensions.influences.campaigns import Real, dense_spread, file_with
 
 PROBING = {"kind": "probing", "standard_uncertainty": "0.4 um", "between_probes": "0.2 um"}
 

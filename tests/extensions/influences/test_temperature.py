@@ -26,14 +26,14 @@ from ballplate.simulator.readings.reading_files import read_readings, write_read
 from ballplate.simulator.readings.simulated import simulated_readings
 from ballplate.uncertainty.quantities import QUANTITIES
 
-from tests.influences import wording
-from tests.influences.campaigns import (
+from tests.extensions.influences import wording
+from tests.extensions.influences.campaigns import (
     dense_spread,
     file_with,
     nominal_arms,
 )
 
-TOP = Path(__file__).parents[2]
+TOP = Path(__file__).parents[3]
 
 PLATE = {"value": 11.5e-6, "u": 0.6e-6}
 SCALE = {"value": 8e-6, "u": 0.3e-6}

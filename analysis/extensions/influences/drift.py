@@ -13,24 +13,30 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 import numpy as np
-from pydantic import Field
-
-from ...geometry.ball_layouts import Name
-from ...geometry.motions import AXIS_NAMES
-from ...inputs.messages import Steps
-from ...inputs.quantities import DURATION_UNITS, Duration, LengthDrift, RatioDrift, Units
-from ...inputs.settings import Forms, NonEmpty, Settings
-from ...machines.protocol import Array
-from ..lookup import References
-from ..objects import Readings
-from .protocol import (
+from ballplate.simulator.design import (
     DesignParts,
     Disturbed,
     Influence,
     InfluenceParameter,
     InfluenceSettings,
+    Readings,
+    References,
     or_unknown,
 )
+from ballplate.simulator.geometry import AXIS_NAMES, Name
+from ballplate.simulator.inputs import (
+    DURATION_UNITS,
+    Duration,
+    Forms,
+    LengthDrift,
+    NonEmpty,
+    RatioDrift,
+    Settings,
+    Steps,
+    Units,
+)
+from ballplate.simulator.machines import Array
+from pydantic import Field
 
 HOUR = 3600.0
 TIME = "time"
@@ -226,3 +232,6 @@ class Drift(Influence):
                 derivative[:, j, k] = hours * at.x[:, j] if of_scale else hours
         values = np.array([axis_amounts.value for axis_amounts in self.listed], float)
         return derivative @ values, derivative
+
+
+SETTINGS = DriftSettings

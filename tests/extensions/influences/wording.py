@@ -1,6 +1,5 @@
 """The wording that the tests of influences expect: a rewording is entered here alone."""
 
-AGAIN_HAS_THE_KIND = 'Again has the kind "sag", as SagSettings has'
 A_PROBE_WITHOUT_AN_OFFSET_HAS = "a probe without an offset has no direction"
 DISPLACEMENT_OF_BALL = "displacement of ball two/r1c1: x"
 DOES_NOT_KNOW_INFLUENCE_QUANTITIES = "does not know influence quantities"

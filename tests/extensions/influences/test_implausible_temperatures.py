@@ -9,7 +9,7 @@ import ballplate as bp
 import pytest
 from ballplate.simulator.experiment.model import Experiment
 
-from tests.influences.campaigns import file_with
+from tests.extensions.influences.campaigns import file_with
 
 PLAUSIBLE: dict[str, Any] = {
     "kind": "temperature",

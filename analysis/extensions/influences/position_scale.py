@@ -12,23 +12,19 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from pydantic import Field
-
-from ...geometry.ball_layouts import Name
-from ...geometry.motions import AXIS_NAMES
-from ...inputs.messages import Steps
-from ...inputs.quantities import Ratio
-from ...inputs.settings import NonEmpty
-from ...machines.protocol import Array, Integers
-from ..lookup import References
-from .protocol import (
+from ballplate.simulator.design import (
     DesignParts,
     Disturbed,
     Influence,
     InfluenceParameter,
     InfluenceSettings,
+    References,
     or_unknown,
 )
+from ballplate.simulator.geometry import AXIS_NAMES, Name
+from ballplate.simulator.inputs import NonEmpty, Ratio, Steps
+from ballplate.simulator.machines import Array, Integers
+from pydantic import Field
 
 # Balls of a position that extend along an axis by less than this, in metres, tell nothing of the
 # scale there.
@@ -107,3 +103,6 @@ class PositionScale(Influence):
             rows = np.flatnonzero(place >= 0)
             derivative[rows, axis, place[rows]] = arms[rows, axis]
         return np.zeros(arms.shape), derivative
+
+
+SETTINGS = PositionScaleSettings

@@ -23,8 +23,8 @@ from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.readings.simulated import simulated_readings
 from ballplate.uncertainty.quantities import QUANTITIES
 
-from tests.influences import wording
-from tests.influences.campaigns import Law, Real, nominal_arms
+from tests.extensions.influences import wording
+from tests.extensions.influences.campaigns import Law, Real, nominal_arms
 from tests.reference import dense
 from tests.reference.small_quickstart import OF_ENTRIES, small_sections
 

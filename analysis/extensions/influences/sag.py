@@ -14,24 +14,31 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field
-
-from ...geometry.ball_layouts import Name
-from ...geometry.motions import AXIS_NAMES
-from ...inputs.messages import ExperimentError, Message, Steps
-from ...inputs.quantities import Length
-from ...inputs.settings import Forms, NonEmpty, Settings, Text, hint, listing
-from ...inputs.tables import read_table
-from ...machines.protocol import Array
-from ..lookup import References
-from .protocol import (
+from ballplate.simulator.design import (
     DesignParts,
     Disturbed,
     Influence,
     InfluenceParameter,
     InfluenceSettings,
+    References,
     or_unknown,
 )
+from ballplate.simulator.geometry import AXIS_NAMES, Name
+from ballplate.simulator.inputs import (
+    ExperimentError,
+    Forms,
+    Length,
+    Message,
+    NonEmpty,
+    Settings,
+    Steps,
+    Text,
+    hint,
+    listing,
+    read_table,
+)
+from ballplate.simulator.machines import Array
+from pydantic import Field
 
 QUADRATIC = {"x": ("x",), "y": ("y",), "both": ("x", "y")}
 Direction = Literal["x", "y", "z", "-x", "-y", "-z"]
@@ -199,3 +206,6 @@ def _values(path: Path, names: tuple[str, ...]) -> Array:
     if messages:
         raise ExperimentError(messages)
     return np.array([values_by_name[name] for name in names])
+
+
+SETTINGS = SagSettings

@@ -11,15 +11,12 @@ from collections.abc import Mapping
 from typing import Literal
 
 import numpy as np
+from ballplate.simulator.design import DesignParts, InfluenceSettings, References, or_unknown
+from ballplate.simulator.geometry import Name
+from ballplate.simulator.inputs import Length, NonEmpty, Steps
 from pydantic import Field
 
-from ...geometry.ball_layouts import Name
-from ...inputs.messages import Steps
-from ...inputs.quantities import Length
-from ...inputs.settings import NonEmpty
-from ..lookup import References
 from .displacements import SharedDisplacements, displacements
-from .protocol import DesignParts, InfluenceSettings, or_unknown
 
 
 class ReindexingSettings(InfluenceSettings):
@@ -57,3 +54,6 @@ class ReindexingSettings(InfluenceSettings):
             "re-indexing",
             of_tips=True,
         )
+
+
+SETTINGS = ReindexingSettings
