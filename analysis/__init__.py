@@ -22,7 +22,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from ballplate.api import (
         check,
-        compare,
         experiment,
         fit,
         load_map,
@@ -33,12 +32,12 @@ if TYPE_CHECKING:
         write_map,
     )
     from ballplate.arguments import load, load_all
-    from ballplate.estimators.estimator_choice import ESTIMATORS
     from ballplate.extensions.assumptions.interface import assumptions
     from ballplate.extensions.campaign.interface import sheet
     from ballplate.extensions.certificates.interface import certificate
     from ballplate.extensions.diagnosis.interface import reliability
     from ballplate.extensions.drafting.interface import design
+    from ballplate.extensions.estimators.interface import compare
     from ballplate.extensions.information.interface import information
     from ballplate.extensions.judgement.interface import budget, compare_models, validate
     from ballplate.extensions.laboratory.interface import read_report
@@ -59,6 +58,7 @@ if TYPE_CHECKING:
     from ballplate.planning.criteria import Criterion
     from ballplate.presentation.files import write_file
     from ballplate.presentation.result import Result
+    from ballplate.results.estimator_choice import ESTIMATORS
     from ballplate.results.fits import Fit
     from ballplate.results.prediction import Prediction
     from ballplate.simulator.computing.processes import in_processes

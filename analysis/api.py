@@ -26,8 +26,7 @@ from ballplate.simulator.inputs.arguments import (
 from ballplate.simulator.inputs.extensions import service
 
 from .arguments import SIGMAS, PathLike, experiment_of, load, observed_of, table_of
-from .estimators.estimator_choice import (
-    COMPARED,
+from .results.estimator_choice import (
     ESTIMATORS,
     EstimatorName,
     takers,
@@ -39,7 +38,6 @@ if TYPE_CHECKING:
     import pandas
 
     from .arguments import Tables
-    from .estimators.distances import EstimatorComparison
     from .planning.criteria import CriterionName
     from .planning.selection import Campaign
     from .presentation.result import FitResult
@@ -267,7 +265,7 @@ def fit(
     >>> fit(quickstart(), readings, estimator="distances", pairs="braced")
     <AlternativeFit of quickstart: distances, converged, full rank>
     """
-    from .estimators.estimator_choice import fit_readings
+    from .results.estimator_choice import fit_readings
 
     ensure_one_of(SIGMAS, sigma=sigma)
     ensure_one_of(ESTIMATORS, estimator=str(estimator))
@@ -299,44 +297,6 @@ def fit(
         across_probes,
         scale,
         offsets,
-    )
-
-
-def compare(
-    experiment: Experiment | PathLike,
-    estimator: EstimatorName = "distances",
-    trials: int = 100,
-    pairs: str | None = None,
-    across_probes: bool = False,
-    seed: int | None = None,
-    points: int = 200,
-    report: Report = unreported,
-) -> EstimatorComparison:
-    """Return the differences between distances corrected by another estimator and by the full one,
-    and of both from the true machine's, on synthetic data sets.
-
-    >>> compare(quickstart(), trials=2, points=10).failed
-    ()
-    """
-    from .estimators.distances import MOST_POINTS, compare_estimators
-    from .montecarlo.trial_runs import MOST_TRIALS
-
-    ensure_one_of(COMPARED, estimator=str(estimator))
-    ensure_type(str, 'a set of pairs of balls, such as "corners"', pairs=pairs)
-    ensure_type(bool, "True or False", across_probes=across_probes)
-    ensure_whole(1, MOST_TRIALS, trials=trials)
-    ensure_whole(0, seed=seed)
-    ensure_whole(1, MOST_POINTS, points=points)
-    ensure_report(report)
-    return compare_estimators(
-        experiment_of(experiment),
-        trials,
-        estimator,  # type: ignore[arg-type]
-        pairs,
-        across_probes,
-        seed,
-        points,
-        report,
     )
 
 

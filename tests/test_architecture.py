@@ -39,7 +39,6 @@ ROOMS = (
     "analysis/presentation",
     "analysis/montecarlo",
     "analysis/results",
-    "analysis/estimators",
     "analysis/planning",
     "analysis/cli",
 )

@@ -31,6 +31,7 @@ BUILDS_ON = {
     ("judgement", "diagnosis"): "the residuals of each model are searched as those of a fit",
     ("certificates", "laboratory"): "both read XML",
     ("certificates", "influences"): "a certificate states the temperature of its plate",
+    ("reproduction", "estimators"): "published comparisons of estimators are reproduced",
     ("diagnosis", "influences"): "influences that are not stated are searched in readings",
     ("maps", "diagnosis"): "certificates in common act on fits as gross errors do",
     ("pages", "campaign"): "the page of a design has its run sheet",
@@ -174,7 +175,6 @@ for line in (
     ["simulate", quickstart, "-o", sys.argv[1]],
     ["simulate", quickstart, "-o", sys.argv[1], "--force"],
     ["plan", sys.argv[2], "--positions", "6", "--workers", "1"],
-    ["compare", quickstart, "--trials", "2"],
     ["fit", quickstart, sys.argv[1]],
 ):
     assert main([*line, "--quiet"]) == 0, line
@@ -222,6 +222,7 @@ OPTIONS = {
     "campaign": (["plan", "POOL", "--positions", "6", "--sheet", "sheet.html"],),
     "laboratory": (["fit", "designs/quickstart.yaml", "designs/reports/z-low.dmo"],),
     "influences": (["check", "tests/cli/files/effects.yaml"],),
+    "estimators": (["fit", "designs/quickstart.yaml", "READINGS", "--estimator", "distances"],),
     "sweeps": (["schema", "sweep"],),
     "maps": (["map", "designs/park/machines/npl-like.yaml", "--curves"],),
     "certificates": (

@@ -44,9 +44,6 @@ COMMANDS = {
     ),
     "simulate": Command("simulate", "write synthetic readings of a design", "measure"),
     "fit": Command("fit", "estimate machine errors, balls and poses from readings", "evaluate"),
-    "compare": Command(
-        "compare", "compare an alternative estimator with the full one on synthetic data"
-    ),
     "schema": Command("schema", "print the JSON Schema of experiment, sweep, machine or map files"),
 }
 # Groups of commands in the help, with their titles.
@@ -478,6 +475,7 @@ if TYPE_CHECKING:
     )
     from .progress_bars import duration, progress
     from .reading_options import (
+        add_pairs,
         add_readings,
         add_readings_argument,
         observed_readings,

@@ -6,7 +6,7 @@ from argparse import ArgumentParser, Namespace
 from functools import partial
 from pathlib import Path
 
-from ..estimators.estimator_choice import (
+from ..results.estimator_choice import (
     DRAWN,
     ESTIMATORS,
     TAKE,
@@ -20,10 +20,9 @@ from .common import (
     day,
     map_path,
 )
-from .compare import add_pairs
 from .notes import note_singular_values, warn
 from .outputs import UsageError, Writer, add_force, add_output, write
-from .reading_options import add_readings, observed_readings, warn_of
+from .reading_options import add_pairs, add_readings, observed_readings, warn_of
 
 DESCRIPTION = (
     "Estimate all parameters of an experiment from readings: a CSV file with the columns position,"

@@ -130,3 +130,21 @@ def tables(
         complain(f"{', '.join(map(str, sources))}: {remark}")
     warn(observed.doubts)
     return observed
+
+
+def add_pairs(parser) -> None:  # type: ignore[no-untyped-def]
+    """Add the choice of the pairs of balls whose distances an alternative estimator uses."""
+    parser.add_argument(
+        "--pairs",
+        metavar="SET",
+        help=(
+            "pairs of balls whose distances are used, a set that the artefacts have, such as corner"
+            " sides, corners, neighbours or all; default: braced for grids (neighbours along rows,"
+            " columns and one diagonal, and all corners), otherwise all"
+        ),
+    )
+    parser.add_argument(
+        "--across-probes",
+        action="store_true",
+        help="also use distances between balls read with different probes in the same position",
+    )

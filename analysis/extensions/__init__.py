@@ -35,6 +35,21 @@ SHIPPED = (
         },
     ),
     _here(
+        "estimators",
+        commands={
+            "compare": Command(
+                "compare_command",
+                "compare an alternative estimator with the full one on synthetic data",
+            ),
+        },
+        functions=_from("interface", "compare"),
+        services={
+            **_from("reversal_fits", "fit_reversal"),
+            **_from("length_fits", "fit_lengths"),
+            **_from("distances", "fit_alternative"),
+        },
+    ),
+    _here(
         "assumptions",
         functions=_from("interface", "assumptions"),
         services=_from("effects", "assumption_effects"),

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
         amount_of,
         as_data,
         ascii_units,
+        by_name,
         chance_words,
         finite,
         given,

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
         length,
         moved_positions,
         null_changes,
+        rank_complaint,
         verdict,
         weak_changes,
     )

@@ -8,21 +8,33 @@ from ballplate.simulator.inputs.faces import lazily
 
 # Public names of this package: extensions import these alone, and its modules are private.
 if TYPE_CHECKING:
-    from .adjustments import FEW, few_degrees_of_freedom, freedom_words
+    from .adjustments import FEW, Adjustment, adjusted, few_degrees_of_freedom, freedom_words
     from .checked_designs import PlannedUncertainty, check, planned_uncertainty, predict
     from .diagnosis import has_exact_values
     from .error_functions import estimated_curves
     from .estimates import (
+        ESTIMATE_COLUMNS,
         ParameterEstimate,
         labels,
     )
+    from .estimator_choice import COMPARED, EstimatorName
     from .fits import Fit
     from .fitting import fit
     from .map_of_fit import data_of, left_out_words
+    from .plates import axes_of_plates
     from .prediction import Prediction
     from .qualifications import Qualification, given_words, qualification_data, qualifications_of
     from .residuals import reading_residuals
     from .sigmas_by_campaign import campaign_sigmas, with_sigmas
-    from .text_blocks import scale_lines, target_lines, verdict_lines
+    from .text_blocks import (
+        MOST_BALLS,
+        adjustment_data,
+        adjustment_lines,
+        coordinates_data,
+        iteration_lines,
+        scale_lines,
+        target_lines,
+        verdict_lines,
+    )
 
 __getattr__, __dir__ = lazily(__name__, __file__)

@@ -43,7 +43,7 @@ class Adjustment:
     words: str
 
 
-def adjustments(
+def adjusted(
     values: Array,
     spread: Array,
     null: Array | None = None,

@@ -17,7 +17,7 @@ from ballplate.simulator.readings.observed_readings import ObservedReadings
 
 from ..rank.verdicts import verdict
 from ..uncertainty.summaries import uncertainties
-from .adjustments import Adjustment, adjustments
+from .adjustments import Adjustment, adjusted
 from .checked_designs import check
 from .diagnosis import diagnosed
 from .estimates import estimated_functions, parameter_estimates
@@ -94,7 +94,7 @@ def _adjustments(at: Linearisation, sigma: float, freedom: float) -> tuple[Adjus
     model, of_model = at.design.model, at.layout.model
     spread, null = sigma * at.shared[of_model], at.shared_null[of_model]
     if isinstance(model, SpatialMetricModel):
-        return adjustments(at.state.a, spread, null, freedom)
+        return adjusted(at.state.a, spread, null, freedom)
     chain = model.spatial if isinstance(model, PlaneModel) else model
     if not isinstance(chain, KinematicModel) or chain.arrangement.workpiece_side:
         # On the workpiece's side an axis's rotations turn its own line as well.
@@ -103,4 +103,4 @@ def _adjustments(at: Linearisation, sigma: float, freedom: float) -> tuple[Adjus
     if not square:
         return ()
     columns = [chain.slices[error.name].start for error in square]
-    return adjustments(at.state.a[columns], spread[columns], null[columns], freedom, square)
+    return adjusted(at.state.a[columns], spread[columns], null[columns], freedom, square)

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
         nominal_places,
         nominal_state,
         read_in_positions,
+        reading_noise,
         reading_uncertainties,
     )
     from .influences.protocol import (
@@ -44,6 +45,7 @@ if TYPE_CHECKING:
         CalibratedDistances,
         DistanceCalibration,
     )
+    from .observations.joint_lengths import equation_root
     from .observations.joint_values import JointValues
     from .observations.lengths import (
         Lengths,

@@ -9,7 +9,7 @@ from ballplate.simulator.inputs.faces import lazily
 # Public names of this package: extensions import these alone, and its modules are private.
 if TYPE_CHECKING:
     from .corrections import corrected_points, correction_rows
-    from .covariance import MICROMETRE
+    from .covariance import EXACT, MICROMETRE
     from .elimination import ROWS_AT_ONCE
     from .functions import (
         BallPlaces,
@@ -25,7 +25,11 @@ if TYPE_CHECKING:
         linear_functions,
     )
     from .gauss_newton import (
+        GaussNewtonSettings,
+        Iteration,
         Solution,
+        Status,
+        as_drawn,
         estimate,
         linearised_fit,
         moved,

@@ -9,7 +9,7 @@ from ballplate.simulator.inputs.faces import lazily
 # Public names of this package: extensions import these alone, and its modules are private.
 if TYPE_CHECKING:
     from .artefacts import BryanGaugeSettings, GridSettings, SquareSettings, TwoSpheresSettings
-    from .axes import PlateAxes, axes_words, plate_axes
+    from .axes import PlateAxes, axes_words, in_plate_axes, plate_axes
     from .ball_layouts import ArtefactSettings, BallLayout, Name, frozen, pairs
     from .grids import even_grid
     from .motions import (
@@ -19,6 +19,8 @@ if TYPE_CHECKING:
         fixes_pose,
         pose_size,
         rigid_motions,
+        rotation_from_vector,
+        vector_from_rotation,
         without_rigid_motion,
     )
     from .positions import (

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
         refused,
     )
     from .module_finder import own_modules
+    from .number_arrays import Flags
     from .problems import Problems
     from .quantities import (
         ANGLE_UNITS,

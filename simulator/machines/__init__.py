@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from .error_names import SQUARENESS_ERRORS, SquarenessError
     from .kinematic import KinematicModel, error_function
     from .kinematic_settings import KinematicSettings
+    from .metric import MetricModel, Scale
     from .model_kinds import Corner, ErrorModelKind
     from .plane import PlaneModel
     from .protocol import (
@@ -36,9 +37,11 @@ if TYPE_CHECKING:
         Unit,
     )
     from .settings import (
+        MetricSettings,
         PythonSettings,
         build_error_model,
     )
+    from .spatial_metric import SpatialMetricModel, parameters_of_metric
     from .volumetric import (
         VolumetricModel,
         meaning,

@@ -9,7 +9,13 @@ from ballplate.simulator.inputs.faces import lazily
 # Public names of this package: extensions import these alone, and its modules are private.
 if TYPE_CHECKING:
     from .fingerprints import position_fingerprints
-    from .generate import NoReadingError, exact_readings, scale_readings
+    from .generate import (
+        NoReadingError,
+        exact_readings,
+        noisy_certificate,
+        noisy_readings,
+        scale_readings,
+    )
     from .given_points import ensure_points, probe_places
     from .joining import joined
     from .observed_readings import ObservedReadings, observe
@@ -23,6 +29,6 @@ if TYPE_CHECKING:
         named_rows,
         plain_rows,
     )
-    from .simulated import Simulated, on_stated_machine, simulated_readings
+    from .simulated import Simulated, on_stated_machine, simulated_readings, too_large
 
 __getattr__, __dir__ = lazily(__name__, __file__)

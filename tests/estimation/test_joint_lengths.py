@@ -13,20 +13,20 @@ from typing import Any, get_args
 
 import numpy as np
 import pytest
+from ballplate.extensions.estimators.alternative_estimators import (
+    AlternativeName,
+    alternative_estimate,
+)
+from ballplate.extensions.estimators.length_equations import length_estimate
 from ballplate.montecarlo.experiments import trials
 from ballplate.results.checked_designs import predict
 from ballplate.simulator.design.arrays import Design, State, nominal_state
 from ballplate.simulator.design.observations.lengths import Lengths, length_whitening
 from ballplate.simulator.design.observations.readings import expected_readings
 from ballplate.simulator.design.parameters import shared_layout
-from ballplate.simulator.estimation.alternative_estimators import (
-    AlternativeName,
-    alternative_estimate,
-)
 from ballplate.simulator.estimation.covariance import spectrum
 from ballplate.simulator.estimation.elimination import eliminate
 from ballplate.simulator.estimation.gauss_newton import gauss_newton, newton_step
-from ballplate.simulator.estimation.length_equations import length_estimate
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment

@@ -21,7 +21,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.estimators.reversal_fits import ReversalFit, fit_reversal
+from ballplate.extensions.estimators.reversal_fits import ReversalFit, fit_reversal
 from ballplate.results.fits import Fit
 from ballplate.results.fitting import fit
 from ballplate.simulator.experiment.layout import lay_out

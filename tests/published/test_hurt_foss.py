@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.extensions.estimators.length_equations import LengthEstimator, length_estimate
 from ballplate.montecarlo.experiments import true_experiment
 from ballplate.montecarlo.reference import Truth, reference
 from ballplate.montecarlo.replicates import BATCH, estimate_batch
@@ -17,7 +18,6 @@ from ballplate.results.checked_designs import predict
 from ballplate.results.fitting import fit
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.lengths import Lengths
-from ballplate.simulator.estimation.length_equations import LengthEstimator, length_estimate
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment

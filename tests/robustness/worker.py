@@ -61,7 +61,7 @@ def _serve(connection: Connection, trial: Trial, memory: int) -> None:
     """Try files until told to end. What was imported before is not counted, what is used together
     is.
     """
-    import ballplate.estimators.distances
+    import ballplate.extensions.estimators.distances
     import ballplate.montecarlo.experiments
     import ballplate.results.checked_designs  # noqa: F401
 

@@ -7,9 +7,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.estimators import compare_estimators
 from ballplate.simulator.computing import Report
 
+from ..estimators import compare_estimators
 from .published import (
     REPEATABILITY,
     SUM_OF_SQUARES,

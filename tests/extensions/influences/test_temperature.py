@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 import yaml
 from ballplate.cli import main
-from ballplate.estimators.estimator_choice import fit_readings
 from ballplate.rank.verdicts import verdict
+from ballplate.results.estimator_choice import fit_readings
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.functions import linear_functions
 from ballplate.simulator.estimation.gauss_newton import estimate

@@ -8,7 +8,7 @@ import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.estimators.reversal_fits import fit_reversal
+from ballplate.extensions.estimators.reversal_fits import fit_reversal
 from ballplate.presentation.vectors import LONGEST, Vectors, draw_vectors, magnification
 from ballplate.results.fitting import fit
 from ballplate.simulator.experiment.layout import lay_out

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from ballplate.estimators import compare_estimators
+from ballplate.extensions.estimators import compare_estimators
 from ballplate.extensions.reproduction import compare
 from ballplate.extensions.reproduction.published import npl
 from ballplate.extensions.reproduction.shipped import Shipped

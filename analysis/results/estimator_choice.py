@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
+from ballplate.simulator.inputs.extensions import service
 from ballplate.simulator.inputs.messages import refused
 
 if TYPE_CHECKING:
@@ -70,17 +71,13 @@ def fit_readings(
         text += " remove them"
         raise refused(experiment.source, text, "influences")
     if estimator == "reversal":
-        from .reversal_fits import fit_reversal
+        return service("fit_reversal")(experiment, observed, scale, offsets, sigma)
+    if estimator in OF_LENGTHS:
+        return service("fit_lengths")(experiment, observed, estimator, sigma)
+    if estimator in OF_DISTANCES:
+        return service("fit_alternative")(
+            experiment, observed, estimator, pairs, across_probes, monomials
+        )
+    from .fitting import fit
 
-        return fit_reversal(experiment, observed, scale, offsets, sigma)
-    if estimator == "length-equations" or estimator == "sphere-then-metric":
-        from .length_fits import fit_lengths
-
-        return fit_lengths(experiment, observed, estimator, sigma)
-    if estimator == "full":
-        from ..results.fitting import fit
-
-        return fit(experiment, observed, sigma, monomials)
-    from .distances import fit_alternative
-
-    return fit_alternative(experiment, observed, estimator, pairs, across_probes, monomials)
+    return fit(experiment, observed, sigma, monomials)

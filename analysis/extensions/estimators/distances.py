@@ -9,41 +9,37 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
-from ballplate.presentation.formatting import Data
-from ballplate.simulator.computing.steps import ProgressStep, Report, unreported
-from ballplate.simulator.design.arrays import Design, State
-from ballplate.simulator.design.observations.lengths import Lengths
-from ballplate.simulator.estimation.alternative_estimators import (
-    AlternativeName,
-    AlternativeSolution,
-    alternative_estimate,
+from ballplate.presentation import (
+    Data,
+    FitResult,
+    MainTable,
+    Result,
+    by_name,
+    given,
+    picked,
+    table_lines,
 )
-from ballplate.simulator.estimation.gauss_newton import GaussNewtonSettings, as_drawn, estimate
-from ballplate.simulator.estimation.length_equations import (
-    LengthEstimator,
-    NotAMetricError,
-    length_estimate,
-)
-from ballplate.simulator.estimation.linearisation import linearise
-from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.geometry.ball_layouts import pairs
-from ballplate.simulator.inputs.messages import refused
-from ballplate.simulator.machines.protocol import Array, Integers
-from ballplate.simulator.readings.generate import (
+from ballplate.results import ESTIMATE_COLUMNS, ParameterEstimate, iteration_lines
+from ballplate.simulator.computing import ProgressStep, Report, unreported
+from ballplate.simulator.design import Design, Lengths, State
+from ballplate.simulator.estimation import GaussNewtonSettings, as_drawn, estimate, linearise
+from ballplate.simulator.experiment import Experiment, lay_out
+from ballplate.simulator.geometry import pairs
+from ballplate.simulator.inputs import refused
+from ballplate.simulator.machines import Array, Integers
+from ballplate.simulator.readings import (
     NoReadingError,
+    ObservedReadings,
     noisy_certificate,
     noisy_readings,
+    observe,
+    on_stated_machine,
+    too_large,
 )
-from ballplate.simulator.readings.observed_readings import ObservedReadings, observe
-from ballplate.simulator.readings.simulated import on_stated_machine, too_large
+from ballplate.uncertainty import uncertainties
 
-from ..presentation.formatting import by_name, given, picked
-from ..presentation.result import FitResult, Result
-from ..presentation.table_columns import MainTable, table_lines
-from ..results.estimates import ESTIMATE_COLUMNS, ParameterEstimate
-from ..results.text_blocks import iteration_lines
-from ..uncertainty.summaries import uncertainties
+from .alternative_estimators import AlternativeName, AlternativeSolution, alternative_estimate
+from .length_equations import LengthEstimator, NotAMetricError, length_estimate
 from .length_fits import has_all_errors
 from .reversal_fits import reversal_beside_full
 from .truth_errors import TruthErrors, truth_errors

@@ -7,26 +7,25 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from ballplate.presentation.formatting import Data
-from ballplate.simulator.estimation.reversal import Reversal
-from ballplate.simulator.geometry.axes import PlateAxes, axes_words, in_plate_axes
-from ballplate.simulator.inputs.settings import listing
-from ballplate.simulator.machines.metric import Scale
-from ballplate.simulator.machines.protocol import Array, Integers
-from ballplate.simulator.readings.observed_readings import ObservedReadings
-
-from ..presentation.formatting import (
+from ballplate.presentation import (
     SHOWN,
+    Data,
+    FitResult,
+    MainTable,
+    Vectors,
     by_name,
+    draw_vectors,
     number,
     picked,
+    table_lines,
 )
-from ..presentation.result import FitResult
-from ..presentation.table_columns import MainTable, table_lines
-from ..presentation.vectors import Vectors, draw_vectors
-from ..results.estimates import ParameterEstimate
-from ..results.fits import Fit
-from ..results.text_blocks import MOST_BALLS, coordinates_data
+from ballplate.results import MOST_BALLS, Fit, ParameterEstimate, coordinates_data
+from ballplate.simulator.geometry import PlateAxes, axes_words, in_plate_axes
+from ballplate.simulator.inputs import listing
+from ballplate.simulator.machines import Array, Integers, Scale
+from ballplate.simulator.readings import ObservedReadings
+
+from .reversal import Reversal
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

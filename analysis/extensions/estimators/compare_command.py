@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from ..estimators.estimator_choice import COMPARED
-from .common import add_file, add_json, at_most, count, trial_count, whole
+from ballplate.cli import add_file, add_json, add_pairs, at_most, count, trial_count, whole
+from ballplate.results import COMPARED
 
 DESCRIPTION = (
     "Estimate synthetic data sets of the file's true machine with the full estimator"
@@ -41,26 +41,8 @@ def add_options(parser: ArgumentParser) -> None:
     add_json(parser)
 
 
-def add_pairs(parser) -> None:  # type: ignore[no-untyped-def]
-    """Add the choice of the pairs of balls whose distances an alternative estimator uses."""
-    parser.add_argument(
-        "--pairs",
-        metavar="SET",
-        help=(
-            "pairs of balls whose distances are used, a set that the artefacts have, such as corner"
-            " sides, corners, neighbours or all; default: braced for grids (neighbours along rows,"
-            " columns and one diagonal, and all corners), otherwise all"
-        ),
-    )
-    parser.add_argument(
-        "--across-probes",
-        action="store_true",
-        help="also use distances between balls read with different probes in the same position",
-    )
-
-
 def _points(text: str) -> int:
-    from ..estimators.distances import MOST_POINTS
+    from .distances import MOST_POINTS
 
     return at_most(count(text), MOST_POINTS, "pairs of points")
 
@@ -69,9 +51,9 @@ def run(options: Namespace) -> int:
     """Compare the estimators for all experiments of the files; 1 if an estimate did not
     converge.
     """
-    from ..estimators.distances import compare_estimators
-    from .common import experiments, print_json, print_lines
-    from .progress_bars import progress
+    from ballplate.cli import experiments, print_json, print_lines, progress
+
+    from .distances import compare_estimators
 
     results = []
     for experiment in experiments(options):

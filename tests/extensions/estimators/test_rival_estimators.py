@@ -12,12 +12,12 @@ import pytest
 from ballplate import experiment as made_of
 from ballplate import fit, simulate
 from ballplate.cli import main
-from ballplate.estimators import distances
-from ballplate.estimators.distances import (
+from ballplate.extensions.estimators import distances
+from ballplate.extensions.estimators.alternative_estimators import AlternativeName
+from ballplate.extensions.estimators.distances import (
     compare_estimators,
     count_terms,
 )
-from ballplate.simulator.estimation.alternative_estimators import AlternativeName
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
@@ -105,10 +105,14 @@ def test_more_terms_than_there_is_memory_for(
     beside = {"distances": 4, "cresto": 40, "kruth": 4 - 62}[estimator]
     assert fitted.solution.observations == terms + beside
     parameters = len(design.model.parameters)
-    monkeypatch.setattr("ballplate.estimators.distances.MOST_DERIVATIVES", terms * parameters)
+    monkeypatch.setattr(
+        "ballplate.extensions.estimators.distances.MOST_DERIVATIVES", terms * parameters
+    )
     found = compare_estimators(experiment, 1, estimator, pair_set, across_probes, points=2)
     assert found.failed == () or estimator == "kruth"
-    monkeypatch.setattr("ballplate.estimators.distances.MOST_DERIVATIVES", terms * parameters - 1)
+    monkeypatch.setattr(
+        "ballplate.extensions.estimators.distances.MOST_DERIVATIVES", terms * parameters - 1
+    )
     with pytest.raises(ExperimentError) as caught:
         compare_estimators(experiment, 1, estimator, pair_set, across_probes, points=2)
     assert (

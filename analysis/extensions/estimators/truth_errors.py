@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.machines import Array
 
 
 @dataclass(frozen=True)

@@ -17,12 +17,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from ..computing.decompositions import lstsq, pinv, svd
-from ..computing.threads import single_threaded
-from ..geometry.motions import fit_motion
-from ..machines.metric import MetricModel, Scale
-from ..machines.protocol import Array
+from ballplate.simulator.computing import lstsq, pinv, single_threaded, svd
+from ballplate.simulator.geometry import fit_motion
+from ballplate.simulator.machines import Array, MetricModel, Scale
 
 # Balls whose spread across their main line is below this fraction of their length count as on one
 # line.

@@ -28,17 +28,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-
-from ..computing.decompositions import svd
-from ..computing.threads import single_threaded
-from ..design.arrays import Design
-from ..design.observations.joint_lengths import equation_root
-from ..design.observations.lengths import Lengths, length_whitening
-from ..inputs.number_arrays import Flags
-from ..machines.protocol import Array
-from ..machines.spatial_metric import parameters_of_metric
-from .covariance import EXACT, MICROMETRE
-from .initial import initial_state
+from ballplate.simulator.computing import single_threaded, svd
+from ballplate.simulator.design import Design, Lengths, equation_root, length_whitening
+from ballplate.simulator.estimation import EXACT, MICROMETRE, initial_state
+from ballplate.simulator.inputs import Flags
+from ballplate.simulator.machines import Array, parameters_of_metric
 
 LengthEstimator = Literal["length-equations", "sphere-then-metric"]
 

@@ -12,31 +12,18 @@ from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.arrays import Design, State, reading_noise
-from ballplate.simulator.design.parameters import SharedLayout
-from ballplate.simulator.estimation.gauss_newton import estimate
-from ballplate.simulator.estimation.reversal import (
-    Reversal,
-    UndeterminedError,
-    reverse,
-    turn_between,
-)
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.geometry.axes import in_plate_axes
-from ballplate.simulator.geometry.motions import rotation_from_vector, vector_from_rotation
-from ballplate.simulator.inputs.messages import ExperimentError, Message, Steps
-from ballplate.simulator.inputs.settings import listing
-from ballplate.simulator.machines.metric import Scale
-from ballplate.simulator.machines.protocol import Array, Integers
-from ballplate.simulator.machines.settings import MetricSettings, build_error_model
-from ballplate.simulator.readings.observed_readings import ObservedReadings
+from ballplate.results import Fit, ParameterEstimate, axes_of_plates, fit
+from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.design import Design, SharedLayout, State, reading_noise
+from ballplate.simulator.estimation import estimate
+from ballplate.simulator.experiment import Experiment
+from ballplate.simulator.geometry import in_plate_axes, rotation_from_vector, vector_from_rotation
+from ballplate.simulator.inputs import ExperimentError, Message, Steps, listing
+from ballplate.simulator.machines import Array, Integers, MetricSettings, Scale, build_error_model
+from ballplate.simulator.readings import ObservedReadings
 from numpy.typing import NDArray
 
-from ..results.estimates import ParameterEstimate
-from ..results.fits import Fit
-from ..results.fitting import fit
-from ..results.plates import axes_of_plates
+from .reversal import Reversal, UndeterminedError, reverse, turn_between
 from .reversal_result import ReversalFit, of_all_balls
 
 INSTEAD = "or fit without --estimator, which takes any positions"

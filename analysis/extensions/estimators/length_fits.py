@@ -7,31 +7,26 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from ballplate.presentation.formatting import Data
-from ballplate.simulator.computing.decompositions import svd
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.observations.lengths import Lengths
-from ballplate.simulator.design.observations.priors import Priors
-from ballplate.simulator.estimation.length_equations import (
-    LengthEstimator,
-    LengthSolution,
-    NotAMetricError,
-    length_estimate,
+from ballplate.presentation import Data, FitResult, MainTable, picked, table_lines
+from ballplate.rank import rank_complaint
+from ballplate.results import (
+    Adjustment,
+    adjusted,
+    adjustment_data,
+    adjustment_lines,
+    few_degrees_of_freedom,
+    freedom_words,
 )
-from ballplate.simulator.estimation.spheres import FLAT, fit_sphere
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.geometry.artefacts import TwoSpheresSettings
-from ballplate.simulator.inputs.messages import refused
-from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
-from ballplate.simulator.readings.observed_readings import ObservedReadings
+from ballplate.simulator.computing import svd
+from ballplate.simulator.design import Design, Lengths, Priors
+from ballplate.simulator.estimation import FLAT, fit_sphere
+from ballplate.simulator.experiment import Experiment
+from ballplate.simulator.geometry import TwoSpheresSettings
+from ballplate.simulator.inputs import refused
+from ballplate.simulator.machines import Array, SpatialMetricModel
+from ballplate.simulator.readings import ObservedReadings
 
-from ..presentation.formatting import picked
-from ..presentation.result import FitResult
-from ..presentation.table_columns import MainTable, table_lines
-from ..rank.verdicts import rank_complaint
-from ..results.adjustments import Adjustment, adjustments, few_degrees_of_freedom, freedom_words
-from ..results.text_blocks import adjustment_data, adjustment_lines
+from .length_equations import LengthEstimator, LengthSolution, NotAMetricError, length_estimate
 
 FACTORS = ("e1", "e2", "e3", "e4", "e5", "e6")
 
@@ -183,9 +178,7 @@ def fit_lengths(
         observed,
         experiment.expected_rank_deficiency,
         solution,
-        adjustments(
-            solution.parameters, solution.spread, solution.null, solution.degrees_of_freedom
-        ),
+        adjusted(solution.parameters, solution.spread, solution.null, solution.degrees_of_freedom),
         tuple(factors.tolist()),
         tuple(
             (design.positions.names[k], tuple(centres[k].tolist())) for k in design.gauge_positions

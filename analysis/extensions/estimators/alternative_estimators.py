@@ -33,17 +33,18 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-
-from ..computing.decompositions import svd
-from ..computing.threads import single_threaded
-from ..design.arrays import Design, nominal_state, reading_uncertainties
-from ..design.observations.distances import CalibratedDistances
-from ..design.observations.lengths import Lengths
-from ..design.observations.priors import Priors
-from ..design.parameters import shared_layout
-from ..machines.protocol import Array, Integers
-from .covariance import EXACT, MICROMETRE
-from .gauss_newton import GaussNewtonSettings, Iteration, Status
+from ballplate.simulator.computing import single_threaded, svd
+from ballplate.simulator.design import (
+    CalibratedDistances,
+    Design,
+    Lengths,
+    Priors,
+    nominal_state,
+    reading_uncertainties,
+    shared_layout,
+)
+from ballplate.simulator.estimation import EXACT, MICROMETRE, GaussNewtonSettings, Iteration, Status
+from ballplate.simulator.machines import Array, Integers
 
 # Share of a distance as read below which an estimate is no machine's.
 COLLAPSE_LIMIT = 0.5

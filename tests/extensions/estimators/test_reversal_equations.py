@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from ballplate.simulator.estimation.reversal import (
+from ballplate.extensions.estimators.reversal import (
     Reversal,
     UndeterminedError,
     reverse,

@@ -11,7 +11,7 @@ import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.estimators.reversal_fits import _mean_readings
+from ballplate.extensions.estimators.reversal_fits import _mean_readings
 
 from tests.cli import wording
 

@@ -8,12 +8,12 @@ from typing import get_args
 
 import numpy as np
 import pytest
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.observations.distances import CalibratedDistances, no_distances
-from ballplate.simulator.estimation.alternative_estimators import (
+from ballplate.extensions.estimators.alternative_estimators import (
     AlternativeName,
     alternative_estimate,
 )
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.observations.distances import CalibratedDistances, no_distances
 from ballplate.simulator.geometry.ball_layouts import pairs
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.kinematic import kinematic_model
