@@ -25,7 +25,6 @@ if TYPE_CHECKING:
         experiment,
         fit,
         load_map,
-        plan,
         quickstart,
         run,
         simulate,
@@ -48,6 +47,8 @@ if TYPE_CHECKING:
         map,
     )
     from ballplate.extensions.pages.interface import page
+    from ballplate.extensions.planning.criteria import Criterion
+    from ballplate.extensions.planning.interface import plan
     from ballplate.extensions.repair.interface import repair
     from ballplate.extensions.reproduction.interface import reproduce
     from ballplate.extensions.requirements.interface import reach
@@ -55,7 +56,6 @@ if TYPE_CHECKING:
     from ballplate.extensions.sweeps.interface import stored, sweep
     from ballplate.extensions.sweeps.running import OtherSweepError
     from ballplate.extensions.sweeps.store_file import StoreError
-    from ballplate.planning.criteria import Criterion
     from ballplate.presentation.files import write_file
     from ballplate.presentation.result import Result
     from ballplate.results.estimator_choice import ESTIMATORS

@@ -9,7 +9,6 @@ and TypeError for one of another type.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, overload
@@ -25,21 +24,18 @@ from ballplate.simulator.inputs.arguments import (
 )
 from ballplate.simulator.inputs.extensions import service
 
-from .arguments import SIGMAS, PathLike, experiment_of, load, observed_of, table_of
+from .arguments import SIGMAS, PathLike, experiment_of, load, observed_of
 from .results.estimator_choice import (
     ESTIMATORS,
     EstimatorName,
     takers,
 )
-from .simulator.experiment.loading import load as load_file
 from .simulator.experiment.model import Experiment
 
 if TYPE_CHECKING:
     import pandas
 
     from .arguments import Tables
-    from .planning.criteria import CriterionName
-    from .planning.selection import Campaign
     from .presentation.result import FitResult
     from .results.fits import Fit
     from .results.prediction import Prediction
@@ -100,7 +96,7 @@ def check(
     ('goal not met: average U6 at most 0.1 µm; average U6 0.1426 µm',)
     """
 
-    from .planning.checked_files import Wanted, checked_design
+    from .results.checked_files import Wanted, checked_design
     from .simulator.experiment.loading import with_pool
 
     ensure_positive("a ratio above 0 and at most 1", 1.0, share=share)
@@ -298,59 +294,6 @@ def fit(
         scale,
         offsets,
     )
-
-
-def plan(
-    experiment: Experiment | PathLike,
-    criterion: CriterionName = "U6",
-    hours: float | None = None,
-    positions: int | None = None,
-    readings: int | None = None,
-    curve: bool = False,
-    seed: int = 1,
-    workers: int = 1,
-    done: PathLike | pandas.DataFrame | None = None,
-    moved: bool = False,
-    earlier: PathLike | None = None,
-    report: Report = unreported,
-) -> Campaign:
-    """Choose positions and certificates from the experiment's pool within a limit, with the bound
-    of any choice.
-
-    Without a limit the choice may cost as much as the positions of the experiment. Readings that
-    are `done` already are kept; if the artefact has `moved` since, a position interrupted there
-    can only be set up again. `earlier` is the file of an earlier choice from this pool, to compare
-    with and continue.
-
-    >>> corners = {"x": ["50 mm"], "y": ["50 mm"]}
-    >>> places = {"planes": ["z"], "levels": ["100 mm", "400 mm"], "corners": corners}
-    >>> pool = {"candidates": [places | {"probes": ["down"]}]}
-    >>> plan(quickstart().with_(pool=pool), positions=7).headline()
-    '7 of 8 candidates, U6 0.137 µm, given chain of axes MB2, temperatures exactly known'
-    """
-    from .planning.campaign_choice import Request, campaign
-    from .planning.constraints import HOUR, Budget
-    from .planning.criteria import NAMES
-    from .simulator.experiment.loading import with_pool
-
-    ensure_one_of(NAMES, criterion=str(criterion))
-    ensure_positive("hours above 0", 1e5, hours=hours)
-    ensure_whole(1, positions=positions, readings=readings, workers=workers)
-    ensure_whole(0, seed=seed)
-    ensure_type(bool, "True or False", curve=curve, moved=moved)
-    ensure_report(report)
-    budget = None
-    if (hours, positions, readings) != (None, None, None):
-        budget = Budget(None if hours is None else HOUR * hours, readings, positions)
-    request = Request(criterion, budget, curve, seed)
-    loaded = load_file(experiment, True) if isinstance(experiment, str | os.PathLike) else ()
-    chosen = loaded[0] if len(loaded) == 1 else with_pool(experiment_of(experiment))
-    done_table = None if done is None else table_of("done", done)
-    before = None if earlier is None else Path(earlier)
-    offered, choice = None, None
-    if done_table is not None or before is not None:
-        offered, choice = service("begun")(chosen, done_table, moved, before)
-    return campaign(chosen, request, offered, choice, workers, report)
 
 
 def load_map(path: PathLike) -> FittedMap:

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.planning.constraints import Budget, constraints
-from ballplate.planning.criteria import criterion
-from ballplate.planning.information import Information, pool_information
-from ballplate.planning.search import Losses, SelectionProblem, best_addition, full_root
+from ballplate.extensions.planning.constraints import Budget, constraints
+from ballplate.extensions.planning.criteria import criterion
+from ballplate.extensions.planning.information import Information, pool_information
+from ballplate.extensions.planning.search import Losses, SelectionProblem, best_addition, full_root
 from ballplate.results.checked_designs import predict
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.experiment.loading import load

@@ -39,7 +39,6 @@ ROOMS = (
     "analysis/presentation",
     "analysis/montecarlo",
     "analysis/results",
-    "analysis/planning",
     "analysis/cli",
 )
 MOST_ROOMS = 18

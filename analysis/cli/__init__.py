@@ -37,11 +37,6 @@ COMMANDS = {
     "init": Command("init", "write a commented experiment or machine file to start from", "plan"),
     "check": Command("check", "check whether designs determine all their parameters", "plan"),
     "run": Command("run", "predict the uncertainties U1 to U6 that a design will achieve", "plan"),
-    "plan": Command(
-        "plan",
-        "choose positions and certificates from a pool, and compute a lower bound for any choice",
-        "plan",
-    ),
     "simulate": Command("simulate", "write synthetic readings of a design", "measure"),
     "fit": Command("fit", "estimate machine errors, balls and poses from readings", "evaluate"),
     "schema": Command("schema", "print the JSON Schema of experiment, sweep, machine or map files"),
@@ -458,6 +453,7 @@ if TYPE_CHECKING:
         write_noted,
         write_picture,
     )
+    from .excerpts import print_errors
     from .notes import complain, note, warn
     from .outputs import (
         PARQUET,

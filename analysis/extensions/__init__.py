@@ -35,6 +35,18 @@ SHIPPED = (
         },
     ),
     _here(
+        "planning",
+        commands={
+            "plan": Command(
+                "plan_command",
+                "choose positions and certificates from a pool, and compute a lower bound for any"
+                " choice",
+                "plan",
+            ),
+        },
+        functions=_from("interface", "plan") | _from("criteria", "Criterion"),
+    ),
+    _here(
         "estimators",
         commands={
             "compare": Command(

@@ -10,6 +10,14 @@ from ballplate.simulator.inputs.faces import lazily
 if TYPE_CHECKING:
     from .adjustments import FEW, Adjustment, adjusted, few_degrees_of_freedom, freedom_words
     from .checked_designs import PlannedUncertainty, check, planned_uncertainty, predict
+    from .checked_files import (
+        CheckedDesign,
+        CheckedFile,
+        Wanted,
+        advised,
+        check_files,
+        checked_design,
+    )
     from .diagnosis import has_exact_values
     from .error_functions import estimated_curves
     from .estimates import (
@@ -23,7 +31,13 @@ if TYPE_CHECKING:
     from .map_of_fit import data_of, left_out_words
     from .plates import axes_of_plates
     from .prediction import Prediction
-    from .qualifications import Qualification, given_words, qualification_data, qualifications_of
+    from .qualifications import (
+        Qualification,
+        given_words,
+        of_pool,
+        qualification_data,
+        qualifications_of,
+    )
     from .residuals import reading_residuals
     from .sigmas_by_campaign import campaign_sigmas, with_sigmas
     from .text_blocks import (

@@ -9,11 +9,11 @@ from ballplate.estimators import distances as estimators
 from ballplate.extensions.diagnosis import remainders
 from ballplate.extensions.maps import correction
 from ballplate.extensions.maps import volumetric_errors as volumetric
+from ballplate.extensions.planning import criteria, information
 from ballplate.extensions.requirements import root_search
 from ballplate.extensions.splines import error_curve, read_points
 from ballplate.extensions.sweeps import axes, bundle, load, sweep_settings
 from ballplate.montecarlo import trial_runs
-from ballplate.planning import criteria, information
 from ballplate.simulator.design import lookup
 from ballplate.simulator.design.observations import distances, joint_values
 from ballplate.simulator.experiment import (

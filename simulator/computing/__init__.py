@@ -8,7 +8,8 @@ from ballplate.simulator.inputs.faces import lazily
 
 # Public names of this package: extensions import these alone, and its modules are private.
 if TYPE_CHECKING:
-    from .decompositions import eigh, lstsq, pinv, svd
+    from .decompositions import eigh, eigvalsh, lstsq, pinv, svd
+    from .internal_error import InternalError
     from .library_versions import versions
     from .memory import want_of_memory
     from .processes import begin_worker, in_processes, interruptions_blocked, processors, safe_path

@@ -47,8 +47,11 @@ if TYPE_CHECKING:
     )
     from .observations.joint_lengths import equation_root
     from .observations.joint_values import JointValues
+    from .observations.kinds import is_of_machine
     from .observations.lengths import (
         Lengths,
+        length_derivative,
+        length_deviations,
         length_directions,
         length_name,
         length_values,
@@ -67,7 +70,7 @@ if TYPE_CHECKING:
     )
     from .observations.star import Stars
     from .observations.stated_values import CertificateEntry, FileValues, value_name
-    from .observations.whitening import CovarianceRoot, Whitening
+    from .observations.whitening import EXACT, CovarianceRoot, Whitening
     from .parameters import SharedLayout, shared_layout
 
 __getattr__, __dir__ = lazily(__name__, __file__)

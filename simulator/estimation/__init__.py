@@ -10,7 +10,7 @@ from ballplate.simulator.inputs.faces import lazily
 if TYPE_CHECKING:
     from .corrections import corrected_points, correction_rows
     from .covariance import EXACT, MICROMETRE
-    from .elimination import ROWS_AT_ONCE
+    from .elimination import ALIKE, ROWS_AT_ONCE
     from .functions import (
         BallPlaces,
         Coordinates,
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
         displacements,
         function_name,
         linear_functions,
+        point_rows,
     )
     from .gauss_newton import (
         GaussNewtonSettings,
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
         moved,
         newton_step,
     )
+    from .graded import Collected, Triangle, triangle
     from .held import holding
     from .initial import initial_state
     from .linearisation import LinearFunctions, Linearisation, linearise

@@ -38,7 +38,8 @@ if TYPE_CHECKING:
     )
     from .placements import in_lengths
     from .pool import placed_only, with_chosen
-    from .pools import seconds_of
+    from .pool_sections import TimesSettings
+    from .pools import READING, SET_UP, seconds_of
     from .readings_section import (
         ColumnsSettings,
         CompensationSettings,

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
         refused,
     )
     from .module_finder import own_modules
-    from .number_arrays import Flags
+    from .number_arrays import Flags, Integers
     from .problems import Problems
     from .quantities import (
         ANGLE_UNITS,
@@ -66,6 +66,7 @@ if TYPE_CHECKING:
         TemperatureDifference,
         Units,
         exact_number,
+        format_duration,
         format_length,
         length_text,
         metres_or_radians,

@@ -10,7 +10,7 @@ from ballplate.simulator.inputs.faces import lazily
 if TYPE_CHECKING:
     from .arrangement import ARRANGEMENTS, AXES, Arrangement
     from .curves import Points
-    from .custom import module_source
+    from .custom import module_file, module_source
     from .description import (
         Combination,
         MachineDescription,

@@ -31,7 +31,7 @@ trials: 16
 # What a person sees with the entry, and of it without.
 SCRIPT = """
 from ballplate.extensions.requirements.goals import SYMBOLS
-from ballplate.planning.criteria import NAMES
+from ballplate.extensions.planning.criteria import NAMES
 
 start = bp.load(folder / "base.yaml")
 found = bp.run(start, trials=64)

@@ -11,7 +11,7 @@ import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.planning.campaign_choice import Request, campaign
+from ballplate.extensions.planning.campaign_choice import Request, campaign
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.functions import Coordinates, Distances, Parameters
 from ballplate.simulator.experiment.loading import with_pool

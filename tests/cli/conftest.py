@@ -10,11 +10,11 @@ from typing import Any
 import ballplate as bp
 import pytest
 from ballplate.cli import _module_of, main
-from ballplate.planning import campaign_choice
+from ballplate.extensions.planning import campaign_choice
 
 from tests.cli.walk import BALLS, DESIGN, WALK
+from tests.extensions.planning.small_pool import TEXT as POOL
 from tests.extensions.sweeps.stores import axis, done, made_up
-from tests.planning.small_pool import TEXT as POOL
 from tests.reference.copies import copy_file, copy_tree
 
 

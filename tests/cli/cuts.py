@@ -23,8 +23,8 @@ from pathlib import Path
 from typing import Any
 
 from ballplate import cli
+from ballplate.extensions.planning import campaign_choice as campaign
 from ballplate.extensions.sweeps import task as sweep_task
-from ballplate.planning import campaign_choice as campaign
 
 EVENTS = ("open", "os.link", "os.rename", "os.remove")
 # Further events, which are raised here: statements to stores, and that a studio has acted.

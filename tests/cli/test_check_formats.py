@@ -17,7 +17,7 @@ import yaml
 from ballplate.cli import main
 from ballplate.extensions.ci.github import annotation_lines, in_message, in_property
 from ballplate.extensions.ci.junit import junit_report
-from ballplate.planning.checked_files import CheckedFile
+from ballplate.results.checked_files import CheckedFile
 from ballplate.simulator.inputs.messages import Message
 
 from tests.cli import wording

@@ -302,7 +302,7 @@ def test_an_error_of_the_program_is_not_called_a_failed_check() -> None:
     """
     code = (
         "import sys\n"
-        "import ballplate.planning.checked_files as checked_files\n"
+        "import ballplate.results.checked_files as checked_files\n"
         "from ballplate.__main__ import main\n"
         "def broken(*_):\n"
         "    raise AssertionError('two is one')\n"

@@ -17,10 +17,10 @@ import pytest
 import yaml
 from numpy.typing import NDArray
 
+from tests.extensions.planning.test_interrupted import TEXT
 from tests.oracle.campaigns import Expected, campaign_file, planned
 from tests.oracle.printed import FACTORS, NUMBER, agrees, output_of, place, step_of, table, within
 from tests.oracle.test_campaigns import measured, offset_of
-from tests.planning.test_interrupted import TEXT
 from tests.reference import dense
 from tests.reference.designs import altered
 

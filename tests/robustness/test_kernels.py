@@ -20,7 +20,7 @@ from typing import Any
 
 import pytest
 
-from tests.planning.small_pool import TEXT as POOL
+from tests.extensions.planning.small_pool import TEXT as POOL
 from tests.reference.copies import copy_file
 from tests.robustness.kernels import architectures
 

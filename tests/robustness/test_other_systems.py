@@ -23,7 +23,7 @@ QUICKSTART = (ROOT / "designs/quickstart.yaml").read_text(encoding="utf-8")
 
 
 def test_a_plan_on_another_drive(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from tests.planning.small_pool import TEXT
+    from tests.extensions.planning.small_pool import TEXT
 
     def relpath(path: object, start: object) -> str:
         raise ValueError(f"path is on mount 'C:', start on mount 'D:' ({path}, {start})")

@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from ballplate.planning import DESCRIPTIONS, HOUR, Budget, Campaign
 from ballplate.presentation import DASHES, INK, MARKERS, MUTED, PAPER, SERIES, drawing, save
+
+from ..planning import DESCRIPTIONS, HOUR, Budget, Campaign
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
-from ballplate.planning import Offer, names_of_plan, offer
 from ballplate.simulator.design import Calibration, CovarianceRoot
 from ballplate.simulator.experiment import Experiment, Position, load
 from ballplate.simulator.inputs import ExperimentError, GivenText, Message, hint, refused
 
+from ..planning import Offer, names_of_plan, offer
 from .positions_read import done_candidates
 
 

@@ -9,7 +9,6 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
-from ballplate.planning import REST, SetUp, base_name, position_of, renamed
 from ballplate.simulator.design import Design
 from ballplate.simulator.experiment import (
     Candidate,
@@ -23,6 +22,8 @@ from ballplate.simulator.geometry import AXIS_NAMES
 from ballplate.simulator.inputs import ExperimentError, GivenText, hint, length_text
 from ballplate.simulator.machines import Array
 from ballplate.simulator.readings import named_rows, read_readings
+
+from ..planning import REST, SetUp, base_name, position_of, renamed
 
 # What an experiment file says of the readings of a position.
 GROUP = ("probes", "balls", "repeats", "standard_uncertainty", "readings")

@@ -12,12 +12,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.planning import RunSheet, Step, position_of
 from ballplate.simulator.experiment import Experiment, lay_out
 from ballplate.simulator.geometry import ball_coordinates
 from ballplate.simulator.inputs import DURATION_UNITS, CsvWriter, in_one_line, refused
 from ballplate.simulator.machines import Array
 from ballplate.simulator.readings import AXES
+
+from ..planning import RunSheet, Step, position_of
 
 # What names of features keep; anything else becomes a hyphen.
 UNUSUAL = re.compile(r"[^A-Za-z0-9.]+")

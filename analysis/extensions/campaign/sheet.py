@@ -5,17 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from ballplate.planning import (
-    RunSheet,
-    sheet_data,
-    sheet_lines,
-    steps_of,
-    summary,
-)
 from ballplate.presentation import Data, Result
 from ballplate.simulator.experiment import Candidate, ChangeTimes, Experiment, in_lengths
 from ballplate.simulator.inputs import refused, to_python
 
+from ..planning import RunSheet, sheet_data, sheet_lines, steps_of, summary
 from .reading_lists import planned_readings, points_csv, points_dmis, template_csv
 from .sheet_page import sheet_page
 

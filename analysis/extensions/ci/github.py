@@ -5,8 +5,9 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from ballplate.planning import CheckedDesign, CheckedFile
 from ballplate.results import (
+    CheckedDesign,
+    CheckedFile,
     scale_lines,
     target_lines,
     verdict_lines,

@@ -6,8 +6,7 @@ import re
 from collections.abc import Sequence
 from xml.etree import ElementTree
 
-from ballplate.planning import CheckedDesign, CheckedFile
-from ballplate.results import verdict_lines
+from ballplate.results import CheckedDesign, CheckedFile, verdict_lines
 from ballplate.simulator.inputs import in_one_line
 
 # No XML document can hold these, not even as character references.

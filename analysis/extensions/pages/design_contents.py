@@ -9,8 +9,7 @@ from ballplate.extensions.diagnosis.redundancy import reliability_of
 from ballplate.extensions.maps.length_map import length_map
 from ballplate.extensions.pages.design_page import DesignContents, design_page
 from ballplate.extensions.pages.page_facts import assumptions, target_in_words, unjudged
-from ballplate.planning import Wanted, checked_design
-from ballplate.results import Prediction
+from ballplate.results import Prediction, Wanted, checked_design
 from ballplate.simulator.computing import Report, unreported
 from ballplate.simulator.experiment import Experiment, with_pool
 from ballplate.simulator.inputs import optional_service

@@ -7,13 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ballplate.cli import check_overwritten, note, write_outputs
-from ballplate.planning import (
-    CheckedDesign,
-    CheckedFile,
-    Wanted,
-    advised,
-    check_files,
-)
+from ballplate.results import CheckedDesign, CheckedFile, Wanted, advised, check_files
 from ballplate.simulator.inputs import ExperimentError, Message, read_text, refused
 
 from .mending import mended

@@ -10,7 +10,14 @@ from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from ballplate.planning import (
+from ballplate.simulator.computing import comparable, eigh
+from ballplate.simulator.experiment import AtMost, Candidate, ChangeTimes, Experiment, Position
+from ballplate.simulator.geometry import even_grid
+from ballplate.simulator.inputs import ExperimentError
+from ballplate.simulator.machines import Array, Integers
+from ballplate.uncertainty import OFFSET_TRIAL, with_offsets
+
+from ..planning import (
     Budget,
     Constraints,
     Frames,
@@ -19,13 +26,6 @@ from ballplate.planning import (
     criterion,
     pool_information,
 )
-from ballplate.simulator.computing import comparable, eigh
-from ballplate.simulator.experiment import AtMost, Candidate, ChangeTimes, Experiment, Position
-from ballplate.simulator.geometry import even_grid
-from ballplate.simulator.inputs import ExperimentError
-from ballplate.simulator.machines import Array, Integers
-from ballplate.uncertainty import OFFSET_TRIAL, with_offsets
-
 from .changes import Change, ChangeKind
 
 # Effort of a calibrated value, in seconds of laboratory time.

@@ -5,10 +5,10 @@ from __future__ import annotations
 from bisect import bisect_left
 from functools import cache
 
-from ballplate.planning import HOUR, Budget, Campaign, Request, campaign
 from ballplate.simulator.experiment import Experiment
 from ballplate.simulator.inputs import ExperimentError
 
+from ..planning import HOUR, Budget, Campaign, Request, campaign
 from .answers import Answer, Status
 from .goals import Goal, judge
 from .unknowns import NotVariableError

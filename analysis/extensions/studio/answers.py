@@ -13,7 +13,6 @@ from ballplate.extensions.maps.length_map import length_map
 from ballplate.extensions.pages.level_maps import MISSED
 from ballplate.extensions.pages.page_facts import target_in_words
 from ballplate.extensions.repair.written import plane_of
-from ballplate.planning import run_sheet
 from ballplate.presentation import Data, percent, picked, uncertainty_words
 from ballplate.rank import Verdict, verdict
 from ballplate.simulator.computing import single_threaded
@@ -24,6 +23,7 @@ from ballplate.simulator.geometry import ball_coordinates, even_grid, without_ri
 from ballplate.simulator.inputs import Target
 from ballplate.uncertainty import Quantity, uncertainties
 
+from ..planning import run_sheet
 from .level_slices import LEVELS, in_slices, point_map
 from .motions import moved_balls, moved_points, null_motions, weak_motions
 

@@ -44,7 +44,7 @@ def _monte_carlo(document: DesignDocument, settings: Mapping[str, Any], report: 
 
 
 def _plan(document: DesignDocument, settings: Mapping[str, Any], report: Report) -> Any:
-    from ballplate.planning import HOUR, Budget, Request, campaign
+    from ..planning import HOUR, Budget, Request, campaign
 
     hours = settings.get("hours")
     request = Request(budget=None if hours is None else Budget(HOUR * float(hours)))

@@ -6,9 +6,9 @@ import io
 from pathlib import Path
 
 from ballplate.extensions.campaign.positions_read import done_candidates
-from ballplate.planning.experiment_file import experiment_text
-from ballplate.planning.schedule import run_sheet
-from ballplate.planning.set_ups import SetUp
+from ballplate.extensions.planning.experiment_file import experiment_text
+from ballplate.extensions.planning.schedule import run_sheet
+from ballplate.extensions.planning.set_ups import SetUp
 from ballplate.simulator.design.arrays import nominal_state
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load

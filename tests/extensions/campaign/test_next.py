@@ -24,7 +24,7 @@ from ballplate.simulator.inputs.yamltree import GivenText
 from scipy.stats import chi2
 
 from tests.extensions.campaign import wording
-from tests.planning.small_pool import TEXT
+from tests.extensions.planning.small_pool import TEXT
 
 QUICKSTART = "designs/quickstart.yaml"
 NAMES = ("z low", "z high", "x low", "x high", "y low", "y high")

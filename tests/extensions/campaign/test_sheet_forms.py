@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 from ballplate.extensions.campaign.sheet_page import sheet_page
-from ballplate.planning.run_sheet_tables import sheet_data, sheet_lines, summary
-from ballplate.planning.schedule import RunSheet, run_sheet
+from ballplate.extensions.planning.run_sheet_tables import sheet_data, sheet_lines, summary
+from ballplate.extensions.planning.schedule import RunSheet, run_sheet
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 

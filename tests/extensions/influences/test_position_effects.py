@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import yaml
 from ballplate.cli import main
-from ballplate.planning.candidate_rows import draw
+from ballplate.extensions.planning.candidate_rows import draw
 from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.design.observations.readings import reading_blocks
 from ballplate.simulator.estimation.functions import linear_functions

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.extensions.campaign.campaign_picture import draw_curve
-from ballplate.planning.constraints import Budget, Spent
-from ballplate.planning.schedule import run_sheet
-from ballplate.planning.selection import Campaign, CurvePoint, Gain
+from ballplate.extensions.planning.constraints import Budget, Spent
+from ballplate.extensions.planning.schedule import run_sheet
+from ballplate.extensions.planning.selection import Campaign, CurvePoint, Gain
 from ballplate.results.checked_designs import predict
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.pool import with_chosen

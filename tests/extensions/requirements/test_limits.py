@@ -19,8 +19,8 @@ from ballplate.extensions.requirements.unknowns import NotVariableError, unknown
 from ballplate.results.checked_designs import predict
 from ballplate.simulator.experiment.loading import load
 
+from tests.extensions.planning.small_pool import TEXT
 from tests.extensions.requirements import wording
-from tests.planning.small_pool import TEXT
 from tests.reference.small_quickstart import small_quickstart
 
 ONLY = {"name": "only", "plane": "z", "level": "100 mm", "corner": {"x": "0 mm", "y": "0 mm"}}

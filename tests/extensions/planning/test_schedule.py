@@ -8,9 +8,9 @@ from itertools import permutations
 
 import numpy as np
 import pytest
-from ballplate.planning.changeover import Setup, changeover
-from ballplate.planning.constraints import Budget, constraints
-from ballplate.planning.schedule import ordered, run_sheet
+from ballplate.extensions.planning.changeover import Setup, changeover
+from ballplate.extensions.planning.constraints import Budget, constraints
+from ballplate.extensions.planning.schedule import ordered, run_sheet
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Position, ReadingGroup
 from ballplate.simulator.geometry.positions import Pose

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise, permutations
 
-from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Position
+from ballplate.simulator.experiment import Candidate, ChangeTimes, Position
 
 
 @dataclass(frozen=True)

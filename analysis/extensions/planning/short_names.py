@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 
-from ballplate.simulator.experiment.model import Candidate, Experiment, Position
+from ballplate.simulator.experiment import Candidate, Experiment, Position
 
 from .set_ups import base_name, position_of
 

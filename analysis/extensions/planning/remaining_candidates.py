@@ -10,9 +10,10 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from ballplate.planning.information import Information
-from ballplate.planning.set_ups import REST, SetUp, base_name, next_name, renamed
-from ballplate.simulator.experiment.model import AtMost, Candidate, Experiment, Pool, Position
+from ballplate.simulator.experiment import AtMost, Candidate, Experiment, Pool, Position
+
+from .information import Information
+from .set_ups import REST, SetUp, base_name, next_name, renamed
 
 
 @dataclass(frozen=True)

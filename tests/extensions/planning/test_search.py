@@ -11,12 +11,12 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
-from ballplate.planning.bound import _Tangent, _whole, bound
-from ballplate.planning.campaign_choice import Request, _budgets, campaign
-from ballplate.planning.constraints import HOUR, Budget, Constraints, constraints
-from ballplate.planning.criteria import CriterionName, criterion, is_about_balls
-from ballplate.planning.information import pool_information
-from ballplate.planning.search import Losses, SelectionProblem, improve, starts, value
+from ballplate.extensions.planning.bound import _Tangent, _whole, bound
+from ballplate.extensions.planning.campaign_choice import Request, _budgets, campaign
+from ballplate.extensions.planning.constraints import HOUR, Budget, Constraints, constraints
+from ballplate.extensions.planning.criteria import CriterionName, criterion, is_about_balls
+from ballplate.extensions.planning.information import pool_information
+from ballplate.extensions.planning.search import Losses, SelectionProblem, improve, starts, value
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import AtMost, Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
@@ -24,7 +24,7 @@ from ballplate.simulator.machines.protocol import Array
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
-from tests.planning import wording
+from tests.extensions.planning import wording
 
 from .small_pool import TEXT
 

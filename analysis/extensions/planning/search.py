@@ -14,10 +14,8 @@ from functools import cached_property
 from itertools import combinations
 
 import numpy as np
-from ballplate.simulator.computing.decompositions import eigh, eigvalsh
-from ballplate.simulator.computing.rounding import comparable
-from ballplate.simulator.computing.threads import scipy_linalg, single_threaded
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.computing import comparable, eigh, eigvalsh, scipy_linalg, single_threaded
+from ballplate.simulator.machines import Array, Integers
 
 from .constraints import Constraints
 from .criteria import Criterion

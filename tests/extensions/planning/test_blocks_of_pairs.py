@@ -10,14 +10,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.planning import criteria, information
-from ballplate.planning.campaign_choice import Request, campaign
-from ballplate.planning.criteria import Criterion, CriterionName, Linear, Pairs, Several
+from ballplate.extensions.planning import criteria, information
+from ballplate.extensions.planning.campaign_choice import Request, campaign
+from ballplate.extensions.planning.criteria import Criterion, CriterionName, Linear, Pairs, Several
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.protocol import Array
 
-from tests.planning import wording
+from tests.extensions.planning import wording
 
 from .small_pool import TEXT
 

@@ -14,10 +14,10 @@ import pytest
 from ballplate.cli import main
 from ballplate.extensions.campaign.earlier import earlier_choice
 from ballplate.extensions.campaign.positions_read import done_candidates
-from ballplate.planning.bound import Bound
-from ballplate.planning.campaign_choice import Request, campaign
-from ballplate.planning.remaining_candidates import offer
-from ballplate.planning.search import SelectionProblem
+from ballplate.extensions.planning.bound import Bound
+from ballplate.extensions.planning.campaign_choice import Request, campaign
+from ballplate.extensions.planning.remaining_candidates import offer
+from ballplate.extensions.planning.search import SelectionProblem
 from ballplate.presentation import percent
 from ballplate.results.checked_designs import predict
 from ballplate.simulator.computing.internal_error import InternalError
@@ -25,7 +25,7 @@ from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 
-from tests.planning import wording
+from tests.extensions.planning import wording
 
 from .small_pool import TEXT
 
@@ -220,7 +220,7 @@ def test_a_choice_better_than_its_bound_is_an_internal_error(
     positions: int, drawn: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A bound that is wrong on purpose, of the choice itself and of a point of the curve."""
-    from ballplate.planning import campaign_choice as planning
+    from ballplate.extensions.planning import campaign_choice as planning
 
     right = planning.bound
 

@@ -8,10 +8,9 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.experiment.model import AtMost, Candidate, ChangeTimes, Position
-from ballplate.simulator.inputs.number_arrays import Flags, Integers
-from ballplate.simulator.inputs.settings import number_of
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.experiment import AtMost, Candidate, ChangeTimes, Position
+from ballplate.simulator.inputs import Flags, Integers, number_of
+from ballplate.simulator.machines import Array
 
 from .changeover import Setup, changeover, kind_of
 

@@ -11,11 +11,11 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
-from ballplate.planning.campaign_choice import TINY_POOL, Request, campaign
-from ballplate.planning.constraints import Budget, constraints
-from ballplate.planning.criteria import CriterionName, criterion, is_about_balls
-from ballplate.planning.information import pool_information
-from ballplate.planning.search import LARGE, Losses, SelectionProblem, full_root, value
+from ballplate.extensions.planning.campaign_choice import TINY_POOL, Request, campaign
+from ballplate.extensions.planning.constraints import Budget, constraints
+from ballplate.extensions.planning.criteria import CriterionName, criterion, is_about_balls
+from ballplate.extensions.planning.information import pool_information
+from ballplate.extensions.planning.search import LARGE, Losses, SelectionProblem, full_root, value
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
@@ -23,8 +23,8 @@ from ballplate.simulator.experiment.model import Candidate, Experiment, Position
 from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.inputs.messages import ExperimentError
 
-from tests.planning import wording
-from tests.planning.small_pool import TEXT as SMALL
+from tests.extensions.planning import wording
+from tests.extensions.planning.small_pool import TEXT as SMALL
 from tests.reference import dense
 
 # Of the pairs of its candidates that have both plates some determine everything, and most leave

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from ballplate.presentation.formatting import Data
-from ballplate.simulator.inputs.messages import in_one_line
-from ballplate.simulator.inputs.quantities import format_duration
-from ballplate.simulator.inputs.settings import number_of
+from ballplate.presentation import Data, picked, table_lines
+from ballplate.simulator.inputs import format_duration, in_one_line, number_of
 
-from ..presentation.formatting import picked
-from ..presentation.table_columns import table_lines
 from .schedule import RunSheet, Step
 
 

@@ -9,18 +9,34 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
-from ballplate.planning.bound import Bound, bound
-from ballplate.planning.constraints import Budget, Constraints, constraints
-from ballplate.planning.criteria import (
-    CriterionName,
-    criterion,
-    is_about_balls,
-    refuse_many_points,
+from ballplate.results import predict
+from ballplate.simulator.computing import (
+    EnoughError,
+    ProgressStep,
+    Report,
+    comparable,
+    counted,
+    in_processes,
+    single_threaded,
+    unreported,
 )
-from ballplate.planning.information import pool_information
-from ballplate.planning.remaining_candidates import Offer, offer, open_directions
-from ballplate.planning.schedule import run_sheet
-from ballplate.planning.search import (
+from ballplate.simulator.experiment import (
+    AtMost,
+    Candidate,
+    Experiment,
+    Pool,
+    Position,
+    with_chosen,
+)
+from ballplate.simulator.inputs import ExperimentError, listing, refused
+
+from .bound import Bound, bound
+from .constraints import Budget, Constraints, constraints
+from .criteria import CriterionName, criterion, is_about_balls, refuse_many_points
+from .information import pool_information
+from .remaining_candidates import Offer, offer, open_directions
+from .schedule import run_sheet
+from .search import (
     GAIN,
     Found,
     Losses,
@@ -31,23 +47,8 @@ from ballplate.planning.search import (
     starts,
     value,
 )
-from ballplate.planning.selection import Campaign, CurvePoint, Gain
-from ballplate.planning.short_names import short_names, stated_names
-from ballplate.results.checked_designs import predict
-from ballplate.simulator.computing.processes import in_processes
-from ballplate.simulator.computing.rounding import comparable
-from ballplate.simulator.computing.steps import (
-    EnoughError,
-    ProgressStep,
-    Report,
-    counted,
-    unreported,
-)
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.experiment.model import AtMost, Candidate, Experiment, Pool, Position
-from ballplate.simulator.experiment.pool import with_chosen
-from ballplate.simulator.inputs.messages import ExperimentError, refused
-from ballplate.simulator.inputs.settings import listing
+from .selection import Campaign, CurvePoint, Gain
+from .short_names import short_names, stated_names
 
 # Random starts of the search, in a large pool and in a small one.
 LARGE_STARTS, SMALL_STARTS = 24, 8

@@ -19,10 +19,10 @@ from ballplate.simulator.inputs.settings import number_of
 from ballplate.simulator.inputs.trust import OPENED, Trust
 from ballplate.simulator.inputs.yamltree import Mark
 
-from ..results.checked_designs import check
-from ..results.extension_results import AskedResult
-from ..results.prediction import Advice, Prediction
-from ..results.qualifications import given_words
+from .checked_designs import check
+from .extension_results import AskedResult
+from .prediction import Advice, Prediction
+from .qualifications import given_words
 
 WITH_MODULES = "leave --no-modules out if you trust the file"
 

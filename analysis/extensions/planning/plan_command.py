@@ -6,25 +6,27 @@ from argparse import Action, ArgumentParser, ArgumentTypeError, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ballplate.simulator.inputs.extensions import service
-
-from .common import (
+from ballplate.cli import (
+    Writer,
     add_file,
+    add_force,
     add_json,
+    add_output,
     add_picture,
     add_workers,
     count,
+    note,
     number,
     page_path,
     show,
     single,
     whole,
+    write,
 )
-from .notes import note
-from .outputs import Writer, add_force, add_output, write
+from ballplate.simulator.inputs import service
 
 if TYPE_CHECKING:
-    from ..planning.selection import Campaign
+    from .selection import Campaign
 
 DESCRIPTION = (
     "Choose the positions and certificates from the pool of an experiment file that minimise a"
@@ -119,7 +121,7 @@ class _Criterion(Action):
 
     @property
     def help(self) -> str:
-        from ..planning.criteria import NAMES
+        from .criteria import NAMES
 
         return f"{NAMES[0]} (default: average), {', '.join(NAMES[1:-1])} or {NAMES[-1]}"
 
@@ -129,7 +131,7 @@ class _Criterion(Action):
 
 
 def _criterion(text: str) -> str:
-    from ..planning.criteria import NAMES
+    from .criteria import NAMES
 
     if text not in NAMES:
         raise ArgumentTypeError(f'choose from {", ".join(NAMES)}, not "{text}"')
@@ -145,13 +147,12 @@ def _hours(text: str) -> float:
 
 def run(options: Namespace) -> int:
     """Choose, print and write; 1 if the choice leaves something undetermined."""
-    from ballplate.simulator.computing.processes import processors
-    from ballplate.simulator.inputs.messages import ExperimentError
+    from ballplate.cli import print_errors, progress
+    from ballplate.simulator.computing import processors
+    from ballplate.simulator.inputs import ExperimentError
 
-    from ..planning.campaign_choice import Request, campaign
-    from ..planning.constraints import HOUR, Budget
-    from .excerpts import print_errors
-    from .progress_bars import progress
+    from .campaign_choice import Request, campaign
+    from .constraints import HOUR, Budget
 
     experiment = single(options, planning=True)
     offered, earlier = None, None

@@ -12,12 +12,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.planning.campaign_choice import TINY_POOL
-from ballplate.planning.constraints import Spent
-from ballplate.planning.criteria import CriterionName
-from ballplate.planning.experiment_file import experiment_text
-from ballplate.planning.schedule import run_sheet
-from ballplate.planning.selection import Campaign
+from ballplate.extensions.planning.campaign_choice import TINY_POOL
+from ballplate.extensions.planning.constraints import Spent
+from ballplate.extensions.planning.criteria import CriterionName
+from ballplate.extensions.planning.experiment_file import experiment_text
+from ballplate.extensions.planning.schedule import run_sheet
+from ballplate.extensions.planning.selection import Campaign
 from ballplate.results.checked_designs import planned_uncertainty, predict
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out

@@ -12,17 +12,17 @@ import numpy as np
 import pytest
 from ballplate.cli import main
 from ballplate.extensions.campaign.positions_read import done_candidates
-from ballplate.planning.campaign_choice import Request, campaign
-from ballplate.planning.constraints import Budget
-from ballplate.planning.remaining_candidates import offer
-from ballplate.planning.schedule import run_sheet
-from ballplate.planning.selection import Campaign
+from ballplate.extensions.planning.campaign_choice import Request, campaign
+from ballplate.extensions.planning.constraints import Budget
+from ballplate.extensions.planning.remaining_candidates import offer
+from ballplate.extensions.planning.schedule import run_sheet
+from ballplate.extensions.planning.selection import Campaign
 from ballplate.results.checked_designs import predict
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment, Position
 from ballplate.simulator.experiment.pool import with_chosen
 
-from tests.planning import wording
+from tests.extensions.planning import wording
 
 from .random_pools import write_some
 

@@ -6,8 +6,8 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Position
-from ballplate.simulator.inputs.settings import listing
+from ballplate.simulator.experiment import Candidate, ChangeTimes, Position
+from ballplate.simulator.inputs import listing
 
 from .changeover import Setup, kind_of, short_order
 from .set_ups import position_of

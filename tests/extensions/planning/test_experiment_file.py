@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 from ballplate.extensions.campaign.sheet import sheet_of
-from ballplate.planning.experiment_file import experiment_text
-from ballplate.planning.schedule import run_sheet
+from ballplate.extensions.planning.experiment_file import experiment_text
+from ballplate.extensions.planning.schedule import run_sheet
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load

@@ -4,19 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ballplate.simulator.inputs.faces import lazily
+from ballplate.simulator.inputs import lazily
 
-# Public names of this package: extensions import these alone, and its modules are private.
+# Public names of this package: other extensions import these alone.
 if TYPE_CHECKING:
     from .campaign_choice import Request, campaign
-    from .checked_files import (
-        CheckedDesign,
-        CheckedFile,
-        Wanted,
-        advised,
-        check_files,
-        checked_design,
-    )
     from .constraints import HOUR, Budget, Constraints
     from .criteria import DESCRIPTIONS, criterion
     from .information import Frames, pool_information

@@ -16,19 +16,26 @@ from functools import cached_property
 from itertools import chain
 
 import numpy as np
-from ballplate.simulator.computing.decompositions import svd
-from ballplate.simulator.computing.steps import Report, counted, unreported
-from ballplate.simulator.computing.threads import scipy_linalg, single_threaded
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.observations.lengths import Lengths, length_deviations
-from ballplate.simulator.design.observations.readings import reading_weights, rotation_sensitivity
-from ballplate.simulator.estimation.covariance import EXACT
-from ballplate.simulator.estimation.elimination import ALIKE
-from ballplate.simulator.estimation.graded import Collected, Triangle
-from ballplate.simulator.estimation.graded import triangle as triangular
-from ballplate.simulator.experiment.model import Candidate, Experiment, Position
-from ballplate.simulator.inputs.messages import refused
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.computing import (
+    Report,
+    counted,
+    scipy_linalg,
+    single_threaded,
+    svd,
+    unreported,
+)
+from ballplate.simulator.design import (
+    Design,
+    Lengths,
+    length_deviations,
+    reading_weights,
+    rotation_sensitivity,
+)
+from ballplate.simulator.estimation import ALIKE, EXACT, Collected, Triangle
+from ballplate.simulator.estimation import triangle as triangular
+from ballplate.simulator.experiment import Candidate, Experiment, Position
+from ballplate.simulator.inputs import refused
+from ballplate.simulator.machines import Array
 
 from .candidate_rows import (
     STEP,

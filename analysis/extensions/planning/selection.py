@@ -8,17 +8,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ballplate.presentation.formatting import Data
-from ballplate.simulator.experiment.model import Candidate, Experiment, Pool
-from ballplate.simulator.experiment.pool import with_chosen
-from ballplate.simulator.inputs.extensions import service
-from ballplate.simulator.inputs.settings import number_of
+from ballplate.presentation import Data, Result, aligned, number, picked
+from ballplate.results import (
+    Prediction,
+    Qualification,
+    given_words,
+    of_pool,
+    qualification_data,
+    target_lines,
+)
+from ballplate.simulator.experiment import Candidate, Experiment, Pool, with_chosen
+from ballplate.simulator.inputs import number_of, service
 
-from ..presentation.formatting import aligned, number, picked
-from ..presentation.result import Result
-from ..results.prediction import Prediction
-from ..results.qualifications import Qualification, given_words, of_pool, qualification_data
-from ..results.text_blocks import target_lines
 from .constraints import HOUR, Budget, Spent
 from .criteria import DESCRIPTIONS, MAXIMUM, CriterionName
 from .experiment_file import experiment_text

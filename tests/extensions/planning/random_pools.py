@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 import yaml
 from ballplate.extensions.campaign.positions_read import done_candidates
-from ballplate.planning.campaign_choice import Request, campaign
-from ballplate.planning.constraints import HOUR, Budget
-from ballplate.planning.criteria import NAMES, CriterionName
-from ballplate.planning.remaining_candidates import offer
-from ballplate.planning.selection import Campaign
-from ballplate.planning.set_ups import SetUp
+from ballplate.extensions.planning.campaign_choice import Request, campaign
+from ballplate.extensions.planning.constraints import HOUR, Budget
+from ballplate.extensions.planning.criteria import NAMES, CriterionName
+from ballplate.extensions.planning.remaining_candidates import offer
+from ballplate.extensions.planning.selection import Campaign
+from ballplate.extensions.planning.set_ups import SetUp
 from ballplate.simulator.design.arrays import nominal_state
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load

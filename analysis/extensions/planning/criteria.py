@@ -14,21 +14,14 @@ from functools import cached_property
 from itertools import chain, compress
 
 import numpy as np
-from ballplate.simulator.computing.decompositions import svd
-from ballplate.simulator.estimation.functions import (
-    BallPlaces,
-    Distances,
-    MeasuredPoints,
-    point_rows,
-)
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.geometry.motions import without_rigid_motion
-from ballplate.simulator.inputs.messages import refused
-from ballplate.simulator.inputs.number_arrays import Flags
-from ballplate.simulator.inputs.quantities import Target
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.computing import svd
+from ballplate.simulator.estimation import BallPlaces, Distances, MeasuredPoints, point_rows
+from ballplate.simulator.experiment import Experiment
+from ballplate.simulator.geometry import without_rigid_motion
+from ballplate.simulator.inputs import Flags, Target, refused
+from ballplate.simulator.machines import Array
+from ballplate.uncertainty import QUANTITIES, functions_of
 
-from ..uncertainty.quantities import QUANTITIES, functions_of
 from .candidate_rows import STEP
 from .information import Information
 

@@ -12,22 +12,25 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design, Observations, State, nominal_state
-from ballplate.simulator.design.observations.balls import BallObservations
-from ballplate.simulator.design.observations.calibration import Calibration
-from ballplate.simulator.design.observations.joint_values import JointValues
-from ballplate.simulator.design.observations.lengths import (
+from ballplate.simulator.design import (
+    EXACT,
+    BallObservations,
+    Calibration,
+    Design,
+    JointValues,
     Lengths,
+    Observations,
+    SharedLayout,
+    State,
     length_derivative,
     length_whitening,
+    nominal_state,
+    reading_blocks,
+    shared_layout,
 )
-from ballplate.simulator.design.observations.readings import reading_blocks
-from ballplate.simulator.design.observations.whitening import EXACT
-from ballplate.simulator.design.parameters import SharedLayout, shared_layout
-from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.model import Experiment, Position
-from ballplate.simulator.inputs.messages import ExperimentError, refused
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.experiment import Experiment, Position, lay_out
+from ballplate.simulator.inputs import ExperimentError, refused
+from ballplate.simulator.machines import Array, Integers
 
 # A micrometre: columns are scaled so that a unit step moves some point by up to this.
 STEP = 1e-6

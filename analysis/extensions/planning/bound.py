@@ -14,10 +14,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.computing.internal_error import InternalError
-from ballplate.simulator.computing.rounding import comparable
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.computing import InternalError, comparable, single_threaded
+from ballplate.simulator.machines import Array
 
 from .search import Losses, SelectionProblem, fill, full_root
 

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from ballplate.planning.campaign_choice import Request, campaign
-from ballplate.planning.constraints import Budget, constraints
-from ballplate.planning.criteria import CriterionName, criterion, is_about_balls
-from ballplate.planning.information import pool_information
-from ballplate.planning.search import Losses, SelectionProblem, value
+from ballplate.extensions.planning.campaign_choice import Request, campaign
+from ballplate.extensions.planning.constraints import Budget, constraints
+from ballplate.extensions.planning.criteria import CriterionName, criterion, is_about_balls
+from ballplate.extensions.planning.information import pool_information
+from ballplate.extensions.planning.search import Losses, SelectionProblem, value
 from ballplate.results.checked_designs import predict
 from ballplate.results.prediction import Prediction
 from ballplate.simulator.estimation.functions import displacements
@@ -26,7 +26,7 @@ from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.uncertainty.pairs import pairs_of
 from ballplate.uncertainty.quantities import functions_of
 
-from tests.planning import wording
+from tests.extensions.planning import wording
 
 from .small_pool import TEXT
 

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from ballplate.simulator.experiment.model import Candidate, Position
+from ballplate.simulator.experiment import Candidate, Position
 
 # How what completes a position, and what sets it up again, is named.
 REST = "rest of "

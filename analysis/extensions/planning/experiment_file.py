@@ -7,15 +7,18 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ballplate.simulator.design.observations.kinds import is_of_machine
-from ballplate.simulator.experiment.model import Candidate, Experiment, Pool, Position
-from ballplate.simulator.experiment.pool_sections import TimesSettings
-from ballplate.simulator.experiment.pools import READING, SET_UP
-from ballplate.simulator.inputs.messages import in_one_line
-from ballplate.simulator.inputs.quantities import format_duration
-from ballplate.simulator.inputs.yaml_writing import yaml_text
-from ballplate.simulator.inputs.yamltree import to_list, to_python
-from ballplate.simulator.machines.custom import module_file
+from ballplate.simulator.design import is_of_machine
+from ballplate.simulator.experiment import (
+    READING,
+    SET_UP,
+    Candidate,
+    Experiment,
+    Pool,
+    Position,
+    TimesSettings,
+)
+from ballplate.simulator.inputs import format_duration, in_one_line, to_list, to_python, yaml_text
+from ballplate.simulator.machines import module_file
 
 LEFT_OUT = ("pool", "variants", "expected_rank_deficiency")
 
