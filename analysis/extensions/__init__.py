@@ -45,6 +45,7 @@ SHIPPED = (
             ),
         },
         functions=_from("interface", "plan") | _from("criteria", "Criterion"),
+        services=_from("pools", "resolve_candidates", "resolve_pool"),
     ),
     _here(
         "estimators",

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
         InfluenceSettings,
         or_unknown,
     )
-    from .lookup import Indices, References
+    from .lookup import Indices, References, lengths_per_axis
     from .objects import SLIGHTLY, Flags, Tasks, Volume
     from .observations.balls import BallObservations
     from .observations.calibration import (

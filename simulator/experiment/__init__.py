@@ -8,7 +8,20 @@ from ballplate.simulator.inputs.faces import lazily
 
 # Public names of this package: extensions import these alone, and its modules are private.
 if TYPE_CHECKING:
+    from .bounds import (
+        EDGE,
+        OUTSIDE,
+        TOLERANCE,
+        Bounds,
+        edge_of,
+        entered,
+        limits_of,
+        occupied,
+        shared,
+    )
+    from .calibrations import resolve_calibration
     from .changes import node_of
+    from .checks import check_inside, check_lengths
     from .error_tables import parse_line, parse_point
     from .json_schema import DRAFT, schema, tidied
     from .layout import lay_out
@@ -36,10 +49,20 @@ if TYPE_CHECKING:
         module_files,
         named_in,
     )
-    from .placements import in_lengths
+    from .placements import check_turns, in_lengths, resolve_position
     from .pool import placed_only, with_chosen
-    from .pool_sections import TimesSettings
-    from .pools import READING, SET_UP, seconds_of
+    from .pool_sections import (
+        GroupSettings,
+        LimitsSettings,
+        ListedSettings,
+        OwnTimesSettings,
+        PlacesByAxis,
+        PoolSettings,
+        RangeSettings,
+        SelectorSettings,
+        TimesSettings,
+        is_group,
+    )
     from .readings_section import (
         ColumnsSettings,
         CompensationSettings,
@@ -48,6 +71,7 @@ if TYPE_CHECKING:
     )
     from .sections import Line, Seed
     from .spans import unspanned
+    from .structure import Sections
     from .variants import (
         is_same_place,
         node_at,

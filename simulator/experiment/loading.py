@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 
 from ..inputs.decoding import refuse_long_lines
+from ..inputs.extensions import service
 from ..inputs.messages import ExperimentError, Message
 from ..inputs.problems import Problems, in_order, written_count
 from ..inputs.trust import OPENED, Trust
-from ..inputs.yamltree import Mapping, Mark, Node, mark_of, parse_tree, read_text
+from ..inputs.yamltree import Mapping, Mark, Node, mark_of, parse_tree, read_text, written
 from ..machines.settings import with_defaults
 from .bounds import resolve_bounds
 from .calibrations import resolve_calibration
@@ -32,11 +33,10 @@ from .checks import (
 )
 from .influences import resolve_influences
 from .machine import resolve_evaluation, resolve_machine, resolve_noise, target_of
-from .model import Evaluation, Experiment
+from .model import Evaluation, Experiment, Position
 from .own_sections import needed_extensions, resolve_own_sections
 from .placements import resolve_position
 from .pool import enabled_only, placed_only
-from .pools import resolve_candidates, resolve_pool
 from .priors import resolve_priors
 from .probes import resolve_probes, resolve_stars
 from .readings_checks import check_readings
@@ -212,18 +212,22 @@ def _build(
             volume = machine.volume if machine is not None and position.enabled else None
             if volume is not None and len(volume.lower) == references.dimension:
                 check_inside(position, ("positions", i), volume, probes, references)
-    candidates = resolve_candidates(sections, positions, bounds, references)
-    possible = candidates.positions if candidates.complete else None
+    candidates = None
+    if written(root, "pool") is not None:
+        candidates = service("resolve_candidates")(sections, positions, bounds, references)
+    is_complete = candidates is None or candidates.complete
+    choices: tuple[Position, ...] = () if candidates is None else candidates.positions
+    possible = choices if is_complete else None
     check_use(sections, positions, position_count, references, possible, planning)
     # What may read calibrated balls, and have priors; more than there is of it where some is wrong.
     off = [position for position in positions.values() if not position.enabled]
     enabled = {i: position for i, position in positions.items() if position.enabled}
-    offered = tuple(candidates.positions or enabled.values())
+    offered = tuple(choices or enabled.values())
     named = dict(enumerate((*offered, *off)))
     readers, reader_count = enabled, position_count - len(off)
     if planning:
         readers = dict(enumerate(offered))
-        reader_count = len(readers) + (not candidates.complete)
+        reader_count = len(readers) + (not is_complete)
     calibrations = {}
     for key, settings in sections.entries("calibration").items():
         i = int(key)
@@ -234,7 +238,9 @@ def _build(
                 calibration, ("calibration", i), readers, reader_count, references
             )
     check_radii(calibrations, problems)
-    pool = resolve_pool(sections, candidates, calibrations, references)
+    pool = None
+    if candidates is not None:
+        pool = service("resolve_pool")(sections, candidates, calibrations, references)
     priors = resolve_priors(sections, machine, named, probes, references)
     influences = resolve_influences(sections, named, references)
     noise = resolve_noise(sections.get("noise"), problems)

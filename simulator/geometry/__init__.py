@@ -28,9 +28,11 @@ if TYPE_CHECKING:
         IN_PLANE_AXES,
         QUARTER_TURNS,
         Axis,
+        PlanePlacement,
         Pose,
         ball_coordinates,
         corners,
+        nominal_pose,
         plane_rotation,
     )
     from .rotations import rotation_matrix

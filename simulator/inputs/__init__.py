@@ -39,8 +39,8 @@ if TYPE_CHECKING:
         refused,
     )
     from .module_finder import own_modules
-    from .number_arrays import Flags, Integers
-    from .problems import Problems
+    from .number_arrays import Array, Flags, Integers
+    from .problems import Problems, written_count, written_text
     from .quantities import (
         ANGLE_UNITS,
         DURATION_UNITS,
@@ -81,6 +81,7 @@ if TYPE_CHECKING:
         plain_unit,
         typed_length,
     )
+    from .room_parts import Place, RoomPart, length_of, place_text
     from .settings import Forms, NonEmpty, Settings, Text, hint, listed, listing, number_of, shorten
     from .spreadsheets import CsvWriter, cell_of_text, text_of_cell
     from .tables import (

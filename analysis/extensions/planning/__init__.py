@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from .constraints import HOUR, Budget, Constraints
     from .criteria import DESCRIPTIONS, criterion
     from .information import Frames, pool_information
+    from .pools import seconds_of
     from .remaining_candidates import Offer, offer
     from .run_sheet_tables import price, sheet_data, sheet_lines, summary, times
     from .schedule import RunSheet, Step, run_sheet, steps_of

@@ -9,8 +9,6 @@ from typing import Any
 
 from ballplate.simulator.design import is_of_machine
 from ballplate.simulator.experiment import (
-    READING,
-    SET_UP,
     Candidate,
     Experiment,
     Pool,
@@ -19,6 +17,8 @@ from ballplate.simulator.experiment import (
 )
 from ballplate.simulator.inputs import format_duration, in_one_line, to_list, to_python, yaml_text
 from ballplate.simulator.machines import module_file
+
+from .pools import READING, SET_UP
 
 LEFT_OUT = ("pool", "variants", "expected_rank_deficiency")
 

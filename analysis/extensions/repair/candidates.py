@@ -16,7 +16,6 @@ from ballplate.simulator.experiment import (
     Probe,
     ReadingGroup,
     placed_only,
-    seconds_of,
 )
 from ballplate.simulator.geometry import (
     AXIS_INDEX,
@@ -30,6 +29,7 @@ from ballplate.simulator.geometry import (
 from ballplate.simulator.inputs import format_length
 from ballplate.simulator.machines import Array
 
+from ..planning import seconds_of
 from .certificates import certificates
 from .changes import (
     Change,

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from ballplate.extensions.planning.pools import seconds_of
 from ballplate.extensions.repair.candidates import candidates, further_readings
 from ballplate.extensions.repair.changes import Change, ChangeKind, changed
 from ballplate.extensions.repair.mending import mended
@@ -36,7 +37,6 @@ from ballplate.simulator.experiment.model import (
     Pool,
     Position,
 )
-from ballplate.simulator.experiment.pools import seconds_of
 
 from tests.extensions.repair import wording
 from tests.reference import dense

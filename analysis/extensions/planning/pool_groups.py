@@ -9,27 +9,43 @@ from itertools import product
 from typing import Any, Literal, get_args
 
 import numpy as np
-
-from ..design.lookup import References, lengths_per_axis
-from ..design.objects import SLIGHTLY
-from ..geometry.ball_layouts import BallLayout
-from ..geometry.positions import (
+from ballplate.simulator.design import SLIGHTLY, References, lengths_per_axis
+from ballplate.simulator.experiment import (
+    OUTSIDE,
+    TOLERANCE,
+    Bounds,
+    GroupSettings,
+    PlacesByAxis,
+    Position,
+    RangeSettings,
+    ReadingGroup,
+    check_turns,
+    edge_of,
+    entered,
+    limits_of,
+    occupied,
+    shared,
+)
+from ballplate.simulator.geometry import (
     AXIS_INDEX,
     IN_PLANE_AXES,
     Axis,
+    BallLayout,
     PlanePlacement,
     Pose,
     nominal_pose,
 )
-from ..inputs.messages import Steps
-from ..inputs.number_arrays import Array
-from ..inputs.quantities import length_text
-from ..inputs.room_parts import Place, RoomPart, length_of, place_text
-from ..inputs.yamltree import to_python, written
-from .bounds import OUTSIDE, TOLERANCE, Bounds, edge_of, entered, limits_of, occupied, shared
-from .model import Position, ReadingGroup
-from .placements import check_turns
-from .pool_sections import GroupSettings, PlacesByAxis, RangeSettings
+from ballplate.simulator.inputs import (
+    Array,
+    Place,
+    RoomPart,
+    Steps,
+    length_of,
+    length_text,
+    place_text,
+    to_python,
+    written,
+)
 
 # Candidates of a pool, those dropped included.
 MOST_CANDIDATES = 20_000

@@ -13,33 +13,52 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-
-from ..design.lookup import References
-from ..design.observations.calibration import Calibration
-from ..design.observations.radius import RadiusCalibration
-from ..geometry.positions import AXIS_INDEX
-from ..inputs.messages import Steps, format_path
-from ..inputs.number_arrays import Array
-from ..inputs.problems import written_count, written_text
-from ..inputs.quantities import format_length
-from ..inputs.settings import hint, listing
-from ..inputs.yamltree import Mapping, Sequence, to_python, written
-from .bounds import EDGE, OUTSIDE, TOLERANCE, Bounds, edge_of, entered, limits_of, occupied
-from .calibrations import resolve_calibration
-from .checks import check_inside, check_lengths
-from .model import AtMost, Candidate, ChangeTimes, Pool, Position
-from .placements import in_lengths, resolve_position
-from .pool_groups import FORBIDDEN, generate
-from .pool_sections import (
+from ballplate.simulator.design import Calibration, RadiusCalibration, References
+from ballplate.simulator.experiment import (
+    EDGE,
+    OUTSIDE,
+    TOLERANCE,
+    AtMost,
+    Bounds,
+    Candidate,
+    ChangeTimes,
     LimitsSettings,
     ListedSettings,
     OwnTimesSettings,
+    Pool,
     PoolSettings,
+    Position,
+    Sections,
     SelectorSettings,
     TimesSettings,
+    check_inside,
+    check_lengths,
+    edge_of,
+    entered,
+    in_lengths,
     is_group,
+    limits_of,
+    occupied,
+    resolve_calibration,
+    resolve_position,
 )
-from .structure import Sections
+from ballplate.simulator.geometry import AXIS_INDEX
+from ballplate.simulator.inputs import (
+    Array,
+    Mapping,
+    Sequence,
+    Steps,
+    format_length,
+    format_path,
+    hint,
+    listing,
+    to_python,
+    written,
+    written_count,
+    written_text,
+)
+
+from .pool_groups import FORBIDDEN, generate
 
 SET_UP, READING, PROBE_CHANGE, PLANE_CHANGE = 20 * 60.0, 15.0, 2 * 60.0, 30 * 60.0
 
