@@ -38,16 +38,10 @@ def _experiment() -> dict[str, Any]:
     return schema()
 
 
-def _machine() -> dict[str, Any]:
-    from ballplate.simulator.experiment.machine_sections import machine_schema
-
-    return machine_schema()
-
-
 def _map() -> dict[str, Any]:
     from ballplate.simulator.experiment.map_sections import map_schema
 
     return map_schema()
 
 
-SCHEMAS = {"experiment": _experiment, "machine": _machine, "map": _map}
+SCHEMAS = {"experiment": _experiment, "map": _map}

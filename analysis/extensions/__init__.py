@@ -35,6 +35,20 @@ SHIPPED = (
         },
     ),
     _here(
+        "machine_files",
+        services={
+            **_from("map_priors", "resolve_map_prior"),
+            **_from("fitted_machine", "machine_of_file"),
+        },
+        schemas={"machine": "machine_sections"},
+        error_models={"machine": "fitted_machine"},
+        true_machines={
+            "curves": "measured_curves",
+            "machine": "described_machine",
+            "map": "mapped_machine",
+        },
+    ),
+    _here(
         "planning",
         commands={
             "plan": Command(

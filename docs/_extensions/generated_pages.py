@@ -14,9 +14,9 @@ from typing import Any
 
 from ballplate.cli import GROUPS
 from ballplate.cli import parser as command_line
+from ballplate.extensions.machine_files.machine_sections import schema as machine_schema
 from ballplate.extensions.sweeps.sweep_schema import schema as sweep_schema
 from ballplate.simulator.experiment.json_schema import schema
-from ballplate.simulator.experiment.machine_sections import machine_schema
 from ballplate.simulator.experiment.map_sections import map_schema
 from ballplate.simulator.inputs.quantities import (
     KINDS,

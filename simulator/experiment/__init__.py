@@ -22,11 +22,9 @@ if TYPE_CHECKING:
     from .calibrations import resolve_calibration
     from .changes import node_of
     from .checks import check_inside, check_lengths
-    from .error_tables import parse_line, parse_point
     from .json_schema import DRAFT, schema, tidied
     from .layout import lay_out
     from .loading import build, load, trees_of, with_pool
-    from .machine_file import load_machine
     from .map_files import is_map_file, read_map
     from .model import (
         AtMost,
@@ -35,6 +33,7 @@ if TYPE_CHECKING:
         Experiment,
         Pool,
         Position,
+        Prior,
         Probe,
         ReadingGroup,
     )
@@ -63,13 +62,14 @@ if TYPE_CHECKING:
         TimesSettings,
         is_group,
     )
+    from .position_sections import Edges
     from .readings_section import (
         ColumnsSettings,
         CompensationSettings,
         Coordinate,
         ReadingsSettings,
     )
-    from .sections import Line, Seed
+    from .sections import Line, MapPriorSettings, Seed, VolumeSettings
     from .spans import unspanned
     from .structure import Sections
     from .variants import (
@@ -79,5 +79,6 @@ if TYPE_CHECKING:
         place_of,
         variant_trees,
     )
+    from .volumes import check_ends, check_within
 
 __getattr__, __dir__ = lazily(__name__, __file__)

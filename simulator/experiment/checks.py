@@ -5,7 +5,7 @@ read.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,34 +17,23 @@ from ..design.observations.radius import RadiusCalibration
 from ..geometry.artefacts import BryanGaugeSettings, TwoSpheresSettings
 from ..geometry.motions import pose_size
 from ..geometry.positions import ball_coordinates
-from ..inputs.messages import ExperimentError, Message, Steps
+from ..inputs.extensions import provided
+from ..inputs.messages import ExperimentError, Steps
 from ..inputs.number_arrays import Array
 from ..inputs.problems import Problems, written_text
 from ..inputs.quantities import format_length
 from ..inputs.settings import listing, number_of
 from ..inputs.yamltree import Mark
-from ..machines.curves import Points
 from ..machines.custom import CustomModelError
-from ..machines.error_names import AXIS_ERRORS
 from ..machines.settings import (
-    MachineFileSettings,
     PythonSettings,
     build_error_model,
     kind_of,
 )
-from ..machines.true_machine_settings import (
-    CurvesSettings,
-    RandomSettings,
-    TrueMachineFileSettings,
-    TrueMapSettings,
-)
+from ..machines.true_machine_settings import FurtherTrueMachine, RandomSettings
 from ..machines.truth import TruthError, true_machine
 from .model import Evaluation, Position, Probe
 from .structure import Sections
-from .volumes import check_within
-
-if TYPE_CHECKING:
-    from ..machines.description import MachineDescription
 
 TOLERANCE = 1e-9
 
@@ -75,13 +64,13 @@ def _check_model(
     settings: Any, steps: Steps, machine: Machine | None, references: References
 ) -> bool:
     """Report faults; return true if the settings can be used further."""
-    if isinstance(settings, MachineFileSettings):
-        found = _machine_of_file(settings.file, steps, references)
-        if found is None:
-            return False
-        settings.set_machine(found)
+    kind, dimension = kind_of(settings), references.dimension
+    try:
+        kind.read(settings, references.folder, references.trust)
+    except ExperimentError as error:
+        references.problems.take(error, (*steps, "file"))
+        return False
     if isinstance(settings, PythonSettings):
-        settings.beside(references.folder, references.trust)
         if machine is None:
             return True
         try:
@@ -89,7 +78,6 @@ def _check_model(
         except CustomModelError as error:
             references.problems.add((*steps, error.key), str(error))
         return True
-    kind, dimension = kind_of(settings), references.dimension
     if dimension is None:
         return True
     if dimension not in kind.dimensions:
@@ -105,55 +93,6 @@ def _check_model(
     return not wrong
 
 
-def _machine_of_file(
-    file: str, steps: Steps, references: References, doubts: list[Message] | None = None
-) -> MachineDescription | None:
-    # What reads other files is loaded where one is named: few experiments have any.
-    from .machine_file import load_machine
-
-    try:
-        return load_machine(references.file(file), doubts, references.trust)
-    except ExperimentError as error:
-        references.problems.take(error, (*steps, "file"))
-        return None
-
-
-def _true_machine_of_file(
-    truth: TrueMachineFileSettings, machine: Machine | None, references: References
-) -> None:
-    """Let the true machine be that of its file, or report its faults."""
-    from ..machines.description import random_part
-
-    steps = ("true_machine", "file")
-    true_machine = _machine_of_file(
-        truth.file, ("true_machine",), references, references.problems.doubts
-    )
-    if true_machine is None:
-        return
-    truth.set_machine(true_machine)
-    random = random_part(true_machine)
-    if random and truth.random_part is None:
-        text = (
-            f"has a random part that simulated readings would lack: {listing(random)}; let"
-            " machine.repeatability cover it and add random_part: omitted, or leave it out of the"
-            " machine file"
-        )
-        references.problems.add(steps, text)
-    if machine is None:
-        return
-    level = truth.level
-    if level is not None and machine.dimension == 3:
-        references.problems.add(("true_machine", "level"), "is for two dimensions; remove it")
-    elif level is not None and not true_machine.lower[2] <= level <= true_machine.upper[2]:
-        ends = " to ".join(
-            format_length(end[2]) for end in (true_machine.lower, true_machine.upper)
-        )
-        text = f"is outside the file's volume ({ends} in z); stay within it"
-        references.problems.add(("true_machine", "level"), text)
-    d = machine.dimension
-    check_within(true_machine.lower[:d], true_machine.upper[:d], machine, steps, references)
-
-
 def check_true_machine(sections: Sections, machine: Machine | None, references: References) -> None:
     """Report a true machine whose own error model is wrong, or values that its error model cannot
     have.
@@ -164,16 +103,10 @@ def check_true_machine(sections: Sections, machine: Machine | None, references: 
     true_model = getattr(truth, "error_model", None)
     if true_model is not None and not _check_model(true_model, _TRUE_MODEL, machine, references):
         return
-    if isinstance(truth, CurvesSettings):
-        _read_curves(truth, machine, references)
-        return
-    if isinstance(truth, TrueMachineFileSettings):
-        _true_machine_of_file(truth, machine, references)
-        return
-    if isinstance(truth, TrueMapSettings):
-        from .used_maps import read_true_map
-
-        read_true_map(truth, machine, references)
+    if isinstance(truth, FurtherTrueMachine):
+        read = provided("true_machines", vars(truth)["kind"], "read")
+        assert read is not None
+        read(truth, machine, references)
         return
     problems = references.problems
     if isinstance(truth, RandomSettings) and truth.position is None and truth.rotation is None:
@@ -199,48 +132,6 @@ def check_true_machine(sections: Sections, machine: Machine | None, references: 
     except TruthError as error:
         for name, text in error.problems:
             problems.add(("true_machine", "values", name), text)
-
-
-def _read_curves(truth: CurvesSettings, machine: Machine | None, references: References) -> None:
-    """Let the true machine have the curves of its files, or report its faults."""
-    from .curve_files import read_numbered_curves
-
-    problems, curves = references.problems, dict[str, Points]()
-    for i, file in enumerate(truth.files):
-        steps = ("true_machine", "files", i)
-        try:
-            found, _, note = read_numbered_curves(references.file(file))
-        except ExperimentError as error:
-            problems.take(error, steps)
-            continue
-        if note:
-            problems.note(steps, f"{file}: {note}")
-        twice = [name for name in found if name in curves]
-        if twice:
-            problems.add(
-                steps,
-                f"{listing(twice)} is in an earlier file already; leave it out of one of the two",
-            )
-        curves |= found
-        if machine is None:
-            continue
-        if machine.dimension == 2 and not any(AXIS_ERRORS[curve].in_plane for curve in found):
-            text = "has no error that moves points within the plane of x and y; leave it out"
-            problems.add(steps, text)
-            continue
-        name, points = next(iter(found.items()))
-        axis = AXIS_ERRORS[name].axis
-        lower, upper = machine.volume.lower[axis], machine.volume.upper[axis]
-        covered = min(points.positions[-1], upper) - max(points.positions[0], lower)
-        if covered < 0.5 * (upper - lower):
-            text = (
-                f"covers {format_length(points.positions[0])} to"
-                f" {format_length(points.positions[-1])}, but machine.volume is"
-                f" {format_length(lower)} to {format_length(upper)} in {AXES[axis]}; cover most of"
-                " it"
-            )
-            problems.add(steps, text)
-    truth.set_curves(curves)
 
 
 _TRUE_MODEL = ("true_machine", "error_model")

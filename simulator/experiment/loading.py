@@ -18,6 +18,7 @@ from ..inputs.problems import Problems, in_order, written_count
 from ..inputs.trust import OPENED, Trust
 from ..inputs.yamltree import Mapping, Mark, Node, mark_of, parse_tree, read_text, written
 from ..machines.settings import with_defaults
+from ..machines.true_machine_settings import with_model_defaults
 from .bounds import resolve_bounds
 from .calibrations import resolve_calibration
 from .changes import node_of
@@ -260,7 +261,7 @@ def _build(
         source=source,
         machine=machine,
         error_model=with_defaults(sections.get("error_model"), machine.dimension),
-        true_machine=with_defaults(sections.get("true_machine"), machine.dimension),
+        true_machine=with_model_defaults(sections.get("true_machine"), machine.dimension),
         probes=probes,
         artefacts=references.artefacts,
         layouts=references.layouts,

@@ -19,14 +19,12 @@ from ..inputs.yamltree import Sequence as SequenceNode
 from ..machines.custom import CustomModelError
 from ..machines.protocol import Array, ErrorModel
 from ..machines.settings import (
-    MachineFileSettings,
     PythonSettings,
     build_error_model,
     kind_of,
 )
 from ..maps.fit_verdict import LackOfFit
 from ..maps.fitted_map import FittedMap, LeftOut, MapData
-from .machine_file import load_machine
 from .map_content import AXES, checksum_of
 from .map_sections import MapSettings
 from .model_files import absolute, fingerprints
@@ -122,12 +120,7 @@ def _model(
         )
         return None
     try:
-        if isinstance(model_settings, MachineFileSettings):
-            model_settings.set_machine(
-                load_machine(trust.file(folder, model_settings.file), trust=trust)
-            )
-        elif isinstance(model_settings, PythonSettings):
-            model_settings.beside(folder, trust)
+        kind.read(model_settings, folder, trust)
         wrong = list(kind.wrong(model_settings, d))
         for below, text in wrong:
             problems.add(("error_model", *below), text)

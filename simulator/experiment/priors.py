@@ -10,6 +10,7 @@ from ..design.lookup import References
 from ..design.objects import Machine
 from ..geometry.artefacts import BryanGaugeSettings
 from ..geometry.motions import AXIS_NAMES, pose_parameter_names
+from ..inputs.extensions import service
 from ..inputs.messages import Steps, format_path
 from ..inputs.number_arrays import Array
 from ..inputs.quantities import PARSERS, QuantityError
@@ -48,10 +49,8 @@ def resolve_priors(
     for i, entry in entries.items():
         steps = ("priors", int(i))
         if isinstance(entry, MapPriorSettings):
-            # Loaded where a map is named: few experiments have any.
-            from .used_maps import resolve_map_prior
-
-            priors += resolve_map_prior(entry, steps, model, machine, references, probes)
+            read = service("resolve_map_prior")
+            priors += read(entry, steps, model, machine, references, probes)
         else:
             priors += _prior(entry, steps, known_quantities, references)
         if len(priors) > MOST_PRIORS:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import codecs
 
 from ..design.lookup import References
+from ..inputs.extensions import service
 from ..inputs.messages import ExperimentError, Steps
 from ..inputs.quantities import LENGTH_UNITS, QuantityError, parse_positive_length, plain_unit
 from ..inputs.settings import hint
@@ -97,12 +98,8 @@ def _read_correction(settings: ReadingsSettings, references: References) -> None
         text = "a machine file has 3 dimensions, but machine.volume has 2"
         references.problems.add(steps, text)
         return
-    # Loaded where a file is named: few experiments have any.
-    from .machine_file import load_machine
-
+    read = service("machine_of_file")
     try:
-        correction.set_machine(
-            load_machine(references.file(correction.file), trust=references.trust)
-        )
+        correction.set_machine(read(references.file(correction.file), references.trust))
     except ExperimentError as error:
         references.problems.take(error, steps)

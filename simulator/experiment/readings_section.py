@@ -6,11 +6,10 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, PrivateAttr
 
 from ..geometry.ball_layouts import Coordinates, Name
 from ..inputs.settings import Forms, NonEmpty, Settings, Text
-from ..machines.described import OfMachineFile
 from ..machines.protocol import TrueMachine
 
 Coordinate = Literal["scale readings", "ball centres", "part"]
@@ -19,17 +18,22 @@ Columns = Forms[Name, Name, Annotated[dict[Name, Name], Field(min_length=1)]]
 _COORDINATE = "its name or number, or {probe: column, …} if each probe has a column"
 
 
-class CompensationSettings(OfMachineFile):
+class CompensationSettings(Settings):
     """The machine's own correction that was on, to be taken off the readings."""
 
     file: Text = Field(description="machine file (YAML) of the correction, as for ballplate map")
 
+    # That of the file; set when the experiment is loaded.
+    _machine: TrueMachine | None = PrivateAttr(default=None)
+
+    def set_machine(self, machine: TrueMachine) -> None:
+        """Set the machine of the file."""
+        self._machine = machine
+
     def machine(self) -> TrueMachine:
         """What the correction added to scale readings."""
-        # Loaded where a machine file is named: few experiments name any.
-        from ..machines.description import true_volumetric
-
-        return true_volumetric(self.described)
+        assert self._machine is not None
+        return self._machine
 
 
 class ColumnsSettings(Settings):

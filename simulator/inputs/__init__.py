@@ -22,7 +22,7 @@ if TYPE_CHECKING:
         half_digit,
         matrix_problems,
     )
-    from .days import stated_day
+    from .days import parse_day, stated_day
     from .decoding import LINE_END, decoded, refuse_controls, text_and_encoding
     from .extensions import optional_service, service
     from .faces import lazily as lazily
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     )
     from .module_finder import own_modules
     from .number_arrays import Array, Flags, Integers
-    from .problems import Problems, written_count, written_text
+    from .problems import Problems, in_order, written_count, written_text
     from .quantities import (
         ANGLE_UNITS,
         DURATION_UNITS,
@@ -49,6 +49,8 @@ if TYPE_CHECKING:
         PARSERS,
         QUANTITY,
         SMALLEST,
+        Angle,
+        Bending,
         CommonPart,
         Duration,
         Expansion,
@@ -66,6 +68,7 @@ if TYPE_CHECKING:
         TemperatureDifference,
         Units,
         exact_number,
+        format_angle,
         format_duration,
         format_length,
         length_text,
@@ -82,7 +85,19 @@ if TYPE_CHECKING:
         typed_length,
     )
     from .room_parts import Place, RoomPart, length_of, place_text
-    from .settings import Forms, NonEmpty, Settings, Text, hint, listed, listing, number_of, shorten
+    from .settings import (
+        Forms,
+        NonEmpty,
+        Settings,
+        Text,
+        describe,
+        hint,
+        listed,
+        listing,
+        nearest,
+        number_of,
+        shorten,
+    )
     from .spreadsheets import CsvWriter, cell_of_text, text_of_cell
     from .tables import (
         MOST_COLUMNS,

@@ -27,7 +27,9 @@ if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
 ENTRY_POINT = "ballplate.extensions"
-OF_FILES = ("artefacts", "calibrations", "error_models", "influences", "sections")
+OF_FILES = (
+    *("artefacts", "calibrations", "error_models", "true_machines", "influences", "sections"),
+)
 KINDS = ("commands", "functions", "services", "schemas", *OF_FILES, "quantities")
 
 # Modules and tables of the kernel's names; the kernel has no services and no influence quantities.
@@ -38,6 +40,7 @@ _KERNEL_TABLES = {
     "artefacts": ("simulator.geometry.artefacts", "ARTEFACTS"),
     "calibrations": ("simulator.design.observations.kinds", "KINDS"),
     "error_models": ("simulator.machines.settings", "KINDS"),
+    "true_machines": ("simulator.machines.true_machine_settings", "KINDS"),
     "sections": ("simulator.experiment.structure", "KEYS"),
     "quantities": ("uncertainty.kernel_quantities", "KERNEL_QUANTITIES"),
 }
@@ -71,10 +74,10 @@ class Extension:
     `functions` are those of `import ballplate`, `services` those that the kernel uses, and
     `schemas` types of files whose module has a function `schema`.
 
-    `artefacts`, `calibrations`, `error_models` and `influences` are values of `kind` in a file, and
-    `sections` further keys of an experiment; their modules have SETTINGS, the class of their
-    values. Modules of calibrations, and of sections that need one, have a function `read`, those of
-    error models an ERROR_MODEL, those of `quantities` a QUANTITY.
+    `artefacts`, `calibrations`, `error_models`, `true_machines` and `influences` are values of
+    `kind` in a file, and `sections` further keys of an experiment; their modules have SETTINGS, the
+    class of their values. Modules of calibrations and true machines, and of sections that need one,
+    have a function `read`, those of error models an ERROR_MODEL, those of `quantities` a QUANTITY.
     """
 
     name: str
@@ -86,6 +89,7 @@ class Extension:
     artefacts: Mapping[str, str] = field(default_factory=dict)
     calibrations: Mapping[str, str] = field(default_factory=dict)
     error_models: Mapping[str, str] = field(default_factory=dict)
+    true_machines: Mapping[str, str] = field(default_factory=dict)
     influences: Mapping[str, str] = field(default_factory=dict)
     sections: Mapping[str, str] = field(default_factory=dict)
     quantities: Mapping[str, str] = field(default_factory=dict)

@@ -9,28 +9,36 @@ from ballplate.simulator.inputs.faces import lazily
 # Public names of this package: extensions import these alone, and its modules are private.
 if TYPE_CHECKING:
     from .arrangement import ARRANGEMENTS, AXES, Arrangement
-    from .curves import Points
-    from .custom import module_file, module_source
-    from .description import (
-        Combination,
-        MachineDescription,
-        ParametricError,
-        PowerSeries,
-        reference_functions,
-        true_volumetric,
+    from .arrangement_settings import (
+        ARRANGEMENT,
+        PRODUCTS,
+        ArrangementName,
+        ArrangementSettings,
+        arrangement_of,
     )
+    from .bases import Basis, Polynomial, SingleFunction, Spline
+    from .custom import module_file, module_source
     from .empirical_settings import EmpiricalSettings
-    from .error_names import SQUARENESS_ERRORS, SquarenessError
-    from .kinematic import KinematicModel, error_function
+    from .error_names import (
+        AXIS_ERRORS,
+        ERRORS,
+        ROTATIONS,
+        SQUARENESS_ERRORS,
+        TRANSLATIONS,
+        AxisError,
+        SquarenessError,
+    )
+    from .kinematic import ErrorFunction, KinematicModel, carried_vectors, error_function
     from .kinematic_settings import KinematicSettings
     from .metric import MetricModel, Scale
     from .model_kinds import Corner, ErrorModelKind
-    from .plane import PlaneModel
+    from .plane import PlaneModel, in_space
     from .protocol import (
         Array,
         ErrorModel,
         HasLines,
         Integers,
+        Line,
         Parameter,
         Reported,
         TrueMachine,
@@ -42,11 +50,6 @@ if TYPE_CHECKING:
         build_error_model,
     )
     from .spatial_metric import SpatialMetricModel, parameters_of_metric
-    from .volumetric import (
-        VolumetricModel,
-        meaning,
-        squareness_field,
-        thermal_field,
-    )
+    from .true_machine_settings import FurtherTrueMachine
 
 __getattr__, __dir__ = lazily(__name__, __file__)

@@ -49,9 +49,7 @@ ARRANGEMENT = (
     "Order of the axes in the chain: a named arrangement, or the axes on either side. "
     "MB2 (x moves y, y moves z, z moves the probe) is NPL's kinematic model."
 )
-ROTATIONS = (
-    "Treatment of products of small errors: neglected (linearised) or multiplied out (full)."
-)
+PRODUCTS = "Treatment of products of small errors: neglected (linearised) or multiplied out (full)."
 
 
 def arrangement_of(settings: str | ArrangementSettings) -> Arrangement:

@@ -10,7 +10,7 @@ from ..inputs.messages import Steps
 from ..inputs.settings import Forms, Settings
 from .arrangement_settings import (
     ARRANGEMENT,
-    ROTATIONS,
+    PRODUCTS,
     ArrangementName,
     ArrangementSettings,
     arrangement_of,
@@ -44,7 +44,7 @@ class KinematicSettings(Settings):
     arrangement: ArrangementName | ArrangementSettings = Field(
         default="MB2", description=ARRANGEMENT
     )
-    rotations: Literal["linearised", "full"] = Field(default="linearised", description=ROTATIONS)
+    rotations: Literal["linearised", "full"] = Field(default="linearised", description=PRODUCTS)
     position_coefficients: int = Field(
         default=5,
         ge=2,

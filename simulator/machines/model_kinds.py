@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from ..inputs.messages import Steps
 from ..inputs.settings import Settings
+from ..inputs.trust import Trust
 from .protocol import ErrorModel
 
 Corner = tuple[float, ...]
@@ -20,7 +22,8 @@ class ErrorModelKind:
     `build` makes the model from `settings` for a volume between two corners in metres;
     `dimensions` lists the possible numbers of co-ordinates. `wrong` returns faults of the settings
     for a number of dimensions as (path in the settings, text) pairs; `with_defaults` states
-    defaults that depend on this number.
+    defaults that depend on this number. `read` completes the settings from files, found from the
+    folder of the experiment; it raises ExperimentError.
     """
 
     settings: type[Settings]
@@ -28,3 +31,4 @@ class ErrorModelKind:
     dimensions: tuple[int, ...] = (2, 3)
     wrong: Callable[[Any, int], Iterable[tuple[Steps, str]]] = lambda settings, dimension: ()
     with_defaults: Callable[[Any, int], Settings] = lambda settings, dimension: settings
+    read: Callable[[Any, Path, Trust], None] = lambda settings, folder, trust: None

@@ -11,18 +11,16 @@ from typing import Annotated, Any, Literal, Union, get_args
 
 from pydantic import Field, PrivateAttr, StringConstraints
 
-from ..inputs.extensions import owner, provided
+from ..inputs.extensions import provided
 from ..inputs.messages import Steps
 from ..inputs.open_kinds import OpenKinds
 from ..inputs.settings import Settings, listing
 from ..inputs.trust import UNKNOWN, Trust
 from .custom import custom_model
-from .described import OfMachineFile
 from .empirical_settings import EMPIRICAL
 from .kinematic_settings import KINEMATIC
 from .metric import MetricModel, Scale
 from .model_kinds import Corner, ErrorModelKind
-from .plane import PlaneModel, in_space
 from .protocol import ErrorModel
 from .spatial_metric import SpatialMetricModel
 
@@ -81,22 +79,6 @@ class PythonSettings(Settings):
         self._trust = trust
 
 
-class MachineFileSettings(OfMachineFile):
-    """The errors in a machine file, without their values, as an error model to be estimated."""
-
-    kind: Literal["machine"] = Field(description="the errors that a machine file states")
-    file: str = Field(description="Machine file (YAML), as for ballplate map.")
-    knots: int = Field(
-        default=3,
-        ge=0,
-        le=50,
-        description=(
-            "Interior knots of the cubic splines that represent errors given as tables, evenly"
-            " spaced."
-        ),
-    )
-
-
 def _metric(settings: MetricSettings, lower: Corner, upper: Corner) -> ErrorModel:
     if len(lower) == 3:
         return SpatialMetricModel(settings.scale != "none", lower, upper)
@@ -123,34 +105,13 @@ def _python(settings: PythonSettings, lower: Corner, upper: Corner) -> ErrorMode
     )
 
 
-def _machine_file(settings: MachineFileSettings, lower: Corner, upper: Corner) -> ErrorModel:
-    # Loaded where a machine file is named: few experiments name any.
-    from .description import fitted_in_plane, fitted_volumetric
-
-    machine = settings.described if len(lower) == 3 else fitted_in_plane(settings.described)
-    model = fitted_volumetric(machine, *in_space(lower, upper), settings.knots)
-    return model if len(lower) == 3 else PlaneModel(model, 0.0)
-
-
-def _wrong_machine_file(settings: MachineFileSettings, dimension: int) -> list[tuple[Steps, str]]:
-    if _machine_file(settings, (0.0,) * dimension, (1.0,) * dimension).parameters:
-        return []
-    plane_note = " in the plane of x and y" if dimension == 2 else ""
-    text = (
-        f"{settings.file} states no error that could be estimated{plane_note}; give polynomials or"
-        " tables"
-    )
-    return [(("file",), text)]
-
-
 ERROR_MODELS: tuple[ErrorModelKind, ...] = (
     KINEMATIC,
     EMPIRICAL,
     ErrorModelKind(
         MetricSettings, _metric, wrong=_wrong_metric, with_defaults=_metric_with_defaults
     ),
-    ErrorModelKind(PythonSettings, _python),
-    ErrorModelKind(MachineFileSettings, _machine_file, wrong=_wrong_machine_file),
+    ErrorModelKind(PythonSettings, _python, read=PythonSettings.beside),
 )
 """The kernel's types of error model."""
 
@@ -174,20 +135,12 @@ def kind_of(settings: Settings) -> ErrorModelKind:
 
 
 def with_defaults(settings: Settings, dimension: int) -> Settings:
-    """Return settings of an error model or true machine with defaults for the number of
-    dimensions.
+    """Return settings of an error model with defaults for the number of dimensions.
 
     >>> with_defaults(MetricSettings(kind="metric"), 3).scale
     'each'
     """
-    if type(settings) in _KINDS or owner(type(settings)) is not None:
-        return kind_of(settings).with_defaults(settings, dimension)
-    model_settings = getattr(settings, "error_model", None)
-    return (
-        settings
-        if model_settings is None
-        else settings.model_copy(update={"error_model": with_defaults(model_settings, dimension)})
-    )
+    return kind_of(settings).with_defaults(settings, dimension)
 
 
 def build_error_model(settings: Settings, lower: Corner, upper: Corner) -> ErrorModel:

@@ -2,25 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
-from pydantic import Field, PrivateAttr
+from pydantic import Field
 
-from ..inputs.quantities import Angle, Length, PositiveLength
-from ..inputs.settings import NonEmpty, Settings
-from .arrangement_settings import (
-    ARRANGEMENT,
-    ROTATIONS,
-    ArrangementName,
-    ArrangementSettings,
-    arrangement_of,
-)
-from .curves import Interpolation, Points, curves_model
-from .described import OfMachineFile
+from ..inputs.open_kinds import OpenKinds
+from ..inputs.quantities import Angle, PositiveLength
+from ..inputs.settings import Settings
 from .model_kinds import Corner
-from .plane import PlaneModel
 from .protocol import ErrorModel, TrueMachine
-from .settings import ErrorModelSettings
+from .settings import ErrorModelSettings, with_defaults
 
 
 class ZeroSettings(Settings):
@@ -65,108 +56,33 @@ class RandomSettings(Settings):
     )
 
 
-class CurvesSettings(Settings):
-    """A machine with measured error curves."""
+class FurtherTrueMachine(Settings):
+    """A true machine that an extension provides, in a module whose `read` completes it from its
+    files and reports faults.
+    """
 
-    kind: Literal["curves"] = Field(description="measured error curves")
-    files: NonEmpty[str] = Field(
-        description=(
-            "CSV files, each with the columns position_mm and errors of one axis such as EXX_um and"
-            " EAX_urad; errors that no file has are zero."
-        )
-    )
-    interpolation: Interpolation = Field(
-        default="linear",
-        description="Interpolation between points: linear, cubic splines, or monotone cubics.",
-    )
-    arrangement: ArrangementName | ArrangementSettings = Field(
-        default="MB2", description=ARRANGEMENT
-    )
-    rotations: Literal["linearised", "full"] = Field(default="linearised", description=ROTATIONS)
-
-    # Curves by ISO 230-1 name; set when the experiment is loaded.
-    _curves: dict[str, Points] = PrivateAttr(default_factory=dict)
-
-    def set_curves(self, curves: dict[str, Points]) -> None:
-        """Set the curves of the files."""
-        self._curves = curves
-
-    def model(self, lower: Corner, upper: Corner) -> ErrorModel:
-        """Return the curves as an error model whose parameters are all one."""
-        return curves_model(
-            self._curves,
-            self.interpolation,
-            arrangement_of(self.arrangement),
-            lower,
-            upper,
-            self.rotations == "full",
-        )
+    def true_machine(self, fitted: ErrorModel, lower: Corner, upper: Corner) -> TrueMachine:
+        """Return the machine in a volume, in the frame of the model that is fitted."""
+        raise NotImplementedError
 
 
-class TrueMachineFileSettings(OfMachineFile):
-    """The machine in a machine file."""
+OF_KERNEL = (ZeroSettings, CoefficientSettings, RandomSettings)
+KINDS = tuple(kind for keys in OF_KERNEL for kind in get_args(keys.model_fields["kind"].annotation))
 
-    kind: Literal["machine"] = Field(description="the machine that a file describes")
-    file: str = Field(description="Machine file (YAML), as for ballplate map.")
-    level: Length | None = Field(
-        default=None,
-        description=(
-            "In two dimensions the position of the z axis; default: that of the reference point."
-        ),
-    )
-    random_part: Literal["omitted"] | None = Field(
-        default=None,
-        description=(
-            '"omitted": simulate without the random part of the file, which machine.repeatability '
-            "covers. Without this key, a file with a random part is refused."
-        ),
-    )
-
-    def machine(self, dimension: int = 3) -> TrueMachine:
-        """Return the systematic errors of the machine, in two dimensions those at the level."""
-        # Loaded where a machine file is named: few experiments name any.
-        from .description import true_volumetric
-
-        machine = true_volumetric(self.described)
-        if dimension == 3:
-            return machine
-        level = self.described.reference[2] if self.level is None else self.level
-        return TrueMachine(PlaneModel(machine.model, level), machine.a)
+if TYPE_CHECKING:
+    TrueMachineSettings = Settings
+else:
+    TrueMachineSettings = Annotated[
+        ZeroSettings | CoefficientSettings | RandomSettings,
+        OpenKinds("true_machines", FurtherTrueMachine),
+    ]
 
 
-class TrueMapSettings(Settings):
-    """The machine of a map file."""
-
-    kind: Literal["map"] = Field(description="the machine that a fit has found")
-    file: str = Field(description="Map file, as ballplate fit -o writes it.")
-    draw: Annotated[int, Field(ge=0)] | None = Field(
-        default=None,
-        description=(
-            "Seed with which the machine is drawn about the estimates, within their covariance;"
-            " default: the estimates themselves."
-        ),
-    )
-
-    # Content of the file; set when the experiment is loaded.
-    _machine: TrueMachine | None = PrivateAttr(default=None)
-    _content: str = PrivateAttr(default="")
-
-    def set_machine(self, machine: TrueMachine, content: str) -> None:
-        """Set the machine of a map file, and the SHA-256 of its content."""
-        self._machine, self._content = machine, content
-
-    def machine(self) -> TrueMachine:
-        """Return the estimated or drawn errors."""
-        assert self._machine is not None
-        return self._machine
-
-
-TrueMachineSettings = Annotated[
-    ZeroSettings
-    | CoefficientSettings
-    | RandomSettings
-    | CurvesSettings
-    | TrueMachineFileSettings
-    | TrueMapSettings,
-    Field(discriminator="kind"),
-]
+def with_model_defaults(settings: Any, dimension: int) -> Any:
+    """Return settings of a true machine whose own error model, if any, states the defaults for the
+    number of dimensions.
+    """
+    model = getattr(settings, "error_model", None)
+    if model is None:
+        return settings
+    return settings.model_copy(update={"error_model": with_defaults(model, dimension)})

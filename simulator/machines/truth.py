@@ -12,16 +12,13 @@ from ..computing.decompositions import lstsq
 from ..inputs.quantities import PARSERS, QuantityError
 from ..inputs.settings import Settings, hint
 from .error_names import AXIS_ERRORS, SQUARENESS_ERRORS, AxisError
-from .framing import in_frame_of
 from .model_kinds import Corner
 from .protocol import Array, ErrorModel, HasLines, TrueMachine
 from .settings import build_error_model
 from .true_machine_settings import (
     CoefficientSettings,
-    CurvesSettings,
+    FurtherTrueMachine,
     RandomSettings,
-    TrueMachineFileSettings,
-    TrueMapSettings,
     ZeroSettings,
 )
 
@@ -53,14 +50,8 @@ def true_machine(
     >>> true_machine(ZeroSettings(), model, *corners).a
     array([0., 0., 0., 0., 0., 0.])
     """
-    if isinstance(settings, CurvesSettings):
-        curves = settings.model(lower, upper)
-        return TrueMachine(curves, np.ones(len(curves.parameters)))
-    if isinstance(settings, TrueMachineFileSettings):
-        return in_frame_of(fitted, settings.machine(len(lower)), lower, upper)
-    if isinstance(settings, TrueMapSettings):
-        machine = settings.machine()
-        return machine if machine.model == fitted else in_frame_of(fitted, machine, lower, upper)
+    if isinstance(settings, FurtherTrueMachine):
+        return settings.true_machine(fitted, lower, upper)
     own_model = getattr(settings, "error_model", None)
     model = fitted if own_model is None else build_error_model(own_model, lower, upper)
     return TrueMachine(model, true_parameters(settings, model))

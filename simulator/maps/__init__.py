@@ -16,5 +16,6 @@ if TYPE_CHECKING:
         MapData,
         readings_in_common,
     )
+    from .map_prior import MapShare, campaign_of, determined_combinations, marginal_of
 
 __getattr__, __dir__ = lazily(__name__, __file__)

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.cli import main
+from ballplate.extensions.machine_files.description import reference_functions
+from ballplate.extensions.machine_files.machine_file import load_machine
 from ballplate.simulator.experiment.loading import load
-from ballplate.simulator.experiment.machine_file import load_machine
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.machines.description import reference_functions
 
 from tests.cli.walk import small_file
 

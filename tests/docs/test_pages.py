@@ -18,8 +18,8 @@ from typing import Any
 import pytest
 import yaml
 from ballplate.cli import parser
+from ballplate.extensions.machine_files.machine_sections import schema as machine_schema
 from ballplate.simulator.experiment.json_schema import schema
-from ballplate.simulator.experiment.machine_sections import machine_schema
 
 from tests.reference.schemas import description
 

@@ -10,9 +10,9 @@ from typing import Any
 import ballplate as bp
 import numpy as np
 import pytest
+from ballplate.extensions.machine_files.description import true_volumetric
+from ballplate.extensions.machine_files.machine_file import load_machine
 from ballplate.results.prediction import Prediction
-from ballplate.simulator.experiment.machine_file import load_machine
-from ballplate.simulator.machines.description import true_volumetric
 
 from tests.estimation import wording
 from tests.reference.model_options import (

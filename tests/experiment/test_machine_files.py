@@ -9,17 +9,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.extensions.maps.volumetric_errors import Volumetric
-from ballplate.simulator.experiment.loading import load
-from ballplate.simulator.experiment.machine_file import load_machine
-from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.machines.curves import Points
-from ballplate.simulator.machines.description import (
+from ballplate.extensions.machine_files.curves import Points
+from ballplate.extensions.machine_files.description import (
     AxisTemperature,
     PowerSeries,
     Squareness,
     random_part,
 )
+from ballplate.extensions.machine_files.machine_file import load_machine
+from ballplate.extensions.maps.volumetric_errors import Volumetric
+from ballplate.simulator.experiment.loading import load
+from ballplate.simulator.inputs.messages import ExperimentError
 
 from tests.experiment import wording
 
@@ -332,7 +332,7 @@ def test_reversed_ends_are_told_with_everything_else(tmp_path: Path) -> None:
 
 
 def test_a_table_that_is_too_long(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("ballplate.simulator.experiment.curve_files.MOST_POINTS", 2)
+    monkeypatch.setattr("ballplate.extensions.machine_files.curve_files.MOST_POINTS", 2)
     (line,) = told(written(tmp_path))
     assert line.startswith(wording.POINTS_ARE_TOO_MANY)
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.simulator.experiment.curve_files import read_numbered_curves
+from ballplate.extensions.machine_files.curve_files import read_numbered_curves
 from ballplate.simulator.inputs import ExperimentError
 
 PLACES = [0.0, 100.0, 200.0, 300.0, 400.0]

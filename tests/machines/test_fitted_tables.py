@@ -7,13 +7,13 @@ from pathlib import Path
 import ballplate as bp
 import numpy as np
 import pytest
-from ballplate.simulator.experiment.machine_file import load_machine
-from ballplate.simulator.machines.curves import Points
-from ballplate.simulator.machines.description import (
+from ballplate.extensions.machine_files.curves import Points
+from ballplate.extensions.machine_files.description import (
     fitted_volumetric,
     reference_functions,
     true_volumetric,
 )
+from ballplate.extensions.machine_files.machine_file import load_machine
 from numpy.testing import assert_allclose
 
 from tests.maps.kinds import IN_SPACE

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from ballplate.simulator.experiment.machine_file import load_machine
+from ballplate.extensions.machine_files.description import fitted_volumetric, true_volumetric
+from ballplate.extensions.machine_files.framing import FramedModel
+from ballplate.extensions.machine_files.machine_file import load_machine
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS, Arrangement
 from ballplate.simulator.machines.bases import Monomial, Polynomial, Spline
-from ballplate.simulator.machines.description import fitted_volumetric, true_volumetric
 from ballplate.simulator.machines.empirical import empirical_model
-from ballplate.simulator.machines.framing import FramedModel
 from ballplate.simulator.machines.joined import JoinedModel
 from ballplate.simulator.machines.kinematic import (
     in_plane,

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from ballplate.extensions.machine_files.curves import Points, curves_model
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.bases import Polynomial, Spline
-from ballplate.simulator.machines.curves import Points, curves_model
 from ballplate.simulator.machines.empirical import empirical_model
 from ballplate.simulator.machines.error_names import AXIS_ERRORS, ERRORS, SQUARENESS_ERRORS
 from ballplate.simulator.machines.kinematic import KinematicModel, in_plane, kinematic_model_of

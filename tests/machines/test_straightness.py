@@ -9,7 +9,7 @@ import pytest
 
 # Loaded beforehand, so that the first example does not take longer than examples may.
 import scipy.optimize  # noqa: F401
-from ballplate.simulator.machines.straightness import reference_line
+from ballplate.extensions.machine_files.straightness import reference_line
 from hypothesis import example, given
 from hypothesis import strategies as st
 

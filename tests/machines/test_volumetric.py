@@ -9,11 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.extensions.maps.volumetric_errors import Volumetric
-from ballplate.simulator.experiment.machine_file import load_machine
-from ballplate.simulator.machines.arrangement import ARRANGEMENTS
-from ballplate.simulator.machines.curves import Points
-from ballplate.simulator.machines.description import (
+from ballplate.extensions.machine_files.curves import Points
+from ballplate.extensions.machine_files.description import (
     AxisTemperature,
     MachineDescription,
     ParametricError,
@@ -22,7 +19,10 @@ from ballplate.simulator.machines.description import (
     fitted_volumetric,
     true_volumetric,
 )
-from ballplate.simulator.machines.straightness import Criterion
+from ballplate.extensions.machine_files.machine_file import load_machine
+from ballplate.extensions.machine_files.straightness import Criterion
+from ballplate.extensions.maps.volumetric_errors import Volumetric
+from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 
 from tests.published.rigid_body import tip_error
 

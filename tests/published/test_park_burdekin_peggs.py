@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from ballplate.simulator.machines.arrangement import ARRANGEMENTS
-from ballplate.simulator.machines.description import (
+from ballplate.extensions.machine_files.description import (
     AxisTemperature,
     MachineDescription,
     ParametricError,
@@ -26,6 +25,7 @@ from ballplate.simulator.machines.description import (
     coupling,
     true_volumetric,
 )
+from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 
 from tests.published.rigid_body import tip_error
 

@@ -21,7 +21,7 @@ from pathlib import Path
 from random import Random
 from unicodedata import category
 
-from ballplate.simulator.experiment.machine_sections import machine_schema
+from ballplate.extensions.machine_files.machine_sections import schema as machine_schema
 
 from tests.robustness.command_lines import changed_line, drawn, grammar, parsed, quick
 from tests.robustness.experiments import SEED, SWEEP_WORDS, WORDS

@@ -11,10 +11,11 @@ from ballplate.simulator.computing import svd
 from ballplate.simulator.design import Volume
 from ballplate.simulator.geometry import cross_matrices, pose_size
 from ballplate.simulator.inputs import LengthFunction, number_of
-from ballplate.simulator.machines import Array, ErrorModel, HasLines, MachineDescription, PlaneModel
+from ballplate.simulator.machines import Array, ErrorModel, HasLines, PlaneModel
 from ballplate.simulator.maps import LackOfFit, MapData
 from ballplate.simulator.readings import position_fingerprints
 
+from ..machine_files import MachineDescription
 from .campaign_tests import EstimatedSigma
 from .volumetric_errors import Volumetric
 

@@ -18,10 +18,10 @@ from ballplate.simulator.machines import (
     HasLines,
     SquarenessError,
     Unit,
-    meaning,
 )
 from ballplate.simulator.maps import FittedMap
 
+from ..machine_files import meaning
 from .volumetric_errors import AlongAxis, Volumetric, along_axes
 
 # Positions along each line.

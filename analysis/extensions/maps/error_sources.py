@@ -8,11 +8,12 @@ from pathlib import Path
 from ballplate.presentation import Data, picked
 from ballplate.results import few_degrees_of_freedom, left_out_words
 from ballplate.simulator.design import Volume
-from ballplate.simulator.experiment import load_machine, read_map
+from ballplate.simulator.experiment import read_map
 from ballplate.simulator.inputs import Message, number_of
 from ballplate.simulator.machines import Arrangement
 from ballplate.simulator.maps import FittedMap, verdict_data, verdict_line
 
+from ..machine_files import load_machine
 from .volumetric_errors import Volumetric
 
 CONVENTION = (

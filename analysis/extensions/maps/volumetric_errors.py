@@ -17,22 +17,24 @@ from ballplate.simulator.design import Volume
 from ballplate.simulator.machines import (
     AXES,
     Array,
-    Combination,
     KinematicModel,
-    MachineDescription,
     Parameter,
+    TrueMachine,
+    error_function,
+)
+
+from ..machine_files import (
+    Combination,
+    MachineDescription,
     ParametricError,
     Points,
     PowerSeries,
-    TrueMachine,
     VolumetricModel,
-    error_function,
     reference_functions,
     squareness_field,
     thermal_field,
     true_volumetric,
 )
-
 from .map_places import MapPlaces
 from .realisations import Draws, Realisations
 

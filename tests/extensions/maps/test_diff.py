@@ -227,8 +227,8 @@ def test_an_expected_map_is_compared_with(
     edge = named["(0, 0, 0) mm to (900, 0, 0) mm"]
     ends = np.array([[0.0, 0.0, 0.0], [0.9, 0.0, 0.0]])
     corrected = fit.correct(ends, "down")  # type: ignore[attr-defined]
+    from ballplate.extensions.machine_files.machine_file import load_machine
     from ballplate.extensions.maps.volumetric_errors import Volumetric
-    from ballplate.simulator.experiment.machine_file import load_machine
 
     described = Volumetric(load_machine(machine)).truth
     p = np.broadcast_to([0.0, 0.0, -0.12], ends.shape)

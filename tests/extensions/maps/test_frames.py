@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 import ballplate as bp
 import numpy as np
 import pytest
+from ballplate.extensions.machine_files.framing import FramedModel
 from ballplate.extensions.maps.compared_maps import ComparedMap, map_of_fit
 from ballplate.extensions.maps.comparison import compared
 from ballplate.results.fits import Fit
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.geometry.motions import cross_matrices
-from ballplate.simulator.machines.framing import FramedModel
 from ballplate.simulator.machines.protocol import Array, ErrorModel, Parameter, Reported
 
 from tests.extensions.maps.campaigns import simulated_fit

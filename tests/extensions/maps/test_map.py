@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.cli import main
+from ballplate.extensions.machine_files.description import reference_functions, stated_function
+from ballplate.extensions.machine_files.machine_file import load_machine
 from ballplate.extensions.maps.error_sources import CONVENTION
 from ballplate.extensions.maps.map_places import PlacesAsked, map_places
 from ballplate.extensions.maps.volumetric_errors import Volumetric
 from ballplate.presentation import number
-from ballplate.simulator.experiment.machine_file import load_machine
-from ballplate.simulator.machines.description import reference_functions, stated_function
 
 from tests.extensions.maps import wording
 

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.extensions.machine_files.machine_file import load_machine
 from ballplate.extensions.maps import volumetric_plots
 from ballplate.extensions.maps.map_places import PlacesAsked, map_places
 from ballplate.extensions.maps.volumetric_errors import Volumetric
 from ballplate.presentation.svg import save
-from ballplate.simulator.experiment.machine_file import load_machine
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.transforms import Bbox

@@ -4,26 +4,33 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, create_model, model_validator
-
-from ..geometry.positions import Axis
-from ..inputs.quantities import (
+from ballplate.simulator.experiment import Edges, Line, VolumeSettings
+from ballplate.simulator.geometry import Axis
+from ballplate.simulator.inputs import (
     Angle,
     Bending,
     Expansion,
+    Forms,
     Length,
     PositiveAngle,
     PositiveLength,
     PositiveTemperatureDifference,
+    Settings,
     TemperatureDifference,
+    Text,
 )
-from ..inputs.settings import Forms, Settings, Text
-from ..machines.arrangement_settings import ARRANGEMENT, ArrangementName, ArrangementSettings
-from ..machines.curves import Interpolation
-from ..machines.error_names import AXIS_ERRORS, SQUARENESS_ERRORS, AxisError
-from ..machines.straightness import Criterion
-from .position_sections import Edges
-from .sections import Line, VolumeSettings
+from ballplate.simulator.machines import (
+    ARRANGEMENT,
+    AXIS_ERRORS,
+    SQUARENESS_ERRORS,
+    ArrangementName,
+    ArrangementSettings,
+    AxisError,
+)
+from pydantic import Field, create_model, model_validator
+
+from .curves import Interpolation
+from .straightness import Criterion
 
 # Polynomials go to the tenth order.
 MOST_COEFFICIENTS = 11
@@ -244,9 +251,9 @@ class DescribedMachineSettings(Settings):
     )
 
 
-def machine_schema() -> dict[str, Any]:
+def schema() -> dict[str, Any]:
     """Return the JSON Schema (draft 2020-12) of a machine file."""
-    from .json_schema import DRAFT, tidied
+    from ballplate.simulator.experiment import DRAFT, tidied
 
     schema: dict[str, Any] = tidied(DescribedMachineSettings.model_json_schema())
     return {"$schema": DRAFT, **schema, "title": "ballplate machine"}

@@ -8,14 +8,17 @@ from itertools import compress
 from pathlib import Path
 
 import numpy as np
+from ballplate.simulator.inputs import (
+    ANGLE_UNITS,
+    LENGTH_UNITS,
+    listing,
+    read_table,
+    refused,
+    table_lines,
+)
+from ballplate.simulator.machines import AXIS_ERRORS, TRANSLATIONS, Array, AxisError, Integers
 
-from ..inputs.messages import refused
-from ..inputs.quantities import ANGLE_UNITS, LENGTH_UNITS
-from ..inputs.settings import listing
-from ..inputs.tables import read_table, table_lines
-from ..machines.curves import NAMES, Points
-from ..machines.error_names import AXIS_ERRORS, TRANSLATIONS, AxisError
-from ..machines.protocol import Array, Integers
+from .curves import NAMES, Points
 
 POSITION = "position"
 EXAMPLE = "position_mm,EXX_um,EYX_um,EAX_urad"

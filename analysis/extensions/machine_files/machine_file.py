@@ -10,19 +10,31 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from ballplate.simulator.experiment import VolumeSettings, check_ends
+from ballplate.simulator.inputs import (
+    UNKNOWN,
+    ExperimentError,
+    Mapping,
+    Message,
+    Problems,
+    Scalar,
+    Steps,
+    Trust,
+    describe,
+    format_angle,
+    format_length,
+    in_order,
+    listing,
+    read_tree,
+    to_python,
+    validated,
+)
+from ballplate.simulator.machines import AXES, arrangement_of
+from ballplate.simulator.splines import SplineError, SplineProblem, at_every
 from pydantic import ValidationError
 
-from ..inputs.messages import ExperimentError, Message, Steps
-from ..inputs.problems import Problems, in_order
-from ..inputs.quantities import format_angle, format_length
-from ..inputs.settings import describe, listing
-from ..inputs.trust import UNKNOWN, Trust
-from ..inputs.validation import validated
-from ..inputs.yamltree import Mapping, Scalar, read_tree, to_python
-from ..machines.arrangement import AXES
-from ..machines.arrangement_settings import arrangement_of
-from ..machines.curves import NAMES, Points
-from ..machines.description import (
+from .curves import NAMES, Points
+from .description import (
     AxisTemperature,
     MachineDescription,
     ParametricError,
@@ -30,13 +42,9 @@ from ..machines.description import (
     Squareness,
     Three,
 )
-from ..machines.volumetric import DROOP, SQUARENESS
-from ..splines.knots import at_every
-from ..splines.spline_problems import SplineError, SplineProblem
 from .error_tables import ErrorTable, read_error_table
 from .machine_sections import DescribedMachineSettings, SmoothingSettings
-from .sections import VolumeSettings
-from .volumes import check_ends
+from .volumetric import DROOP, SQUARENESS
 
 # Part of a polynomial's coefficients that is rounding.
 NOTHING = 1e-12

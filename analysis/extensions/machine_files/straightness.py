@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-
-from .protocol import Array
+from ballplate.simulator.machines import Array
 
 Criterion = Literal["end points", "least squares", "minimum zone"]
 

@@ -10,16 +10,25 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
 
-from ..inputs.messages import ExperimentError, Message
-from ..inputs.quantities import QuantityError, format_length, parse_length
-from ..inputs.settings import hint, listing, nearest, shorten
-from ..inputs.yamltree import Mark, read_text
-from ..machines.arrangement import AXES
-from ..machines.curves import Points
-from ..machines.description import Three
-from ..machines.error_names import AXIS_ERRORS
-from ..machines.straightness import Criterion
+from ballplate.simulator.inputs import (
+    ExperimentError,
+    Mark,
+    Message,
+    QuantityError,
+    format_length,
+    hint,
+    listing,
+    nearest,
+    parse_length,
+    read_text,
+    shorten,
+)
+from ballplate.simulator.machines import AXES, AXIS_ERRORS
+
 from .curve_files import BANDWIDTH, read_numbered_curves
+from .curves import Points
+from .description import Three
+from .straightness import Criterion
 
 COMMENT = re.compile(r"\s*#\s*(.*?)\s*$")
 

@@ -12,13 +12,25 @@ from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import numpy as np
+from ballplate.simulator.machines import (
+    AXIS_ERRORS,
+    ROTATIONS,
+    SQUARENESS_ERRORS,
+    TRANSLATIONS,
+    Arrangement,
+    Array,
+    AxisError,
+    Basis,
+    KinematicModel,
+    Polynomial,
+    SingleFunction,
+    Spline,
+    TrueMachine,
+    carried_vectors,
+    error_function,
+)
 
-from .arrangement import Arrangement
-from .bases import Basis, Polynomial, SingleFunction, Spline
 from .curves import Curve, Interpolation, Points
-from .error_names import AXIS_ERRORS, ROTATIONS, SQUARENESS_ERRORS, TRANSLATIONS, AxisError
-from .kinematic import KinematicModel, carried_vectors, error_function
-from .protocol import Array, TrueMachine
 from .straightness import Criterion, reference_line
 from .volumetric import DROOP, Field, VolumetricModel, droop_field, squareness_field, thermal_field
 

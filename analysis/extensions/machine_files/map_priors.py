@@ -1,60 +1,34 @@
-"""Maps that an experiment names: as its true machine, or as prior knowledge of its machine."""
+"""Maps of other campaigns as prior knowledge of the machine."""
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping
 from datetime import date
 
 import numpy as np
-
-from ..design.lookup import References
-from ..design.objects import Machine, Volume
-from ..geometry.grids import even_grid
-from ..inputs.days import parse_day
-from ..inputs.messages import ExperimentError, Steps, format_path
-from ..inputs.settings import listing
-from ..inputs.yamltree import mark_of, read_bytes
-from ..machines.protocol import Array, ErrorModel, TrueMachine
-from ..machines.true_machine_settings import TrueMapSettings
-from ..maps.fitted_map import FittedMap
-from ..maps.map_prior import MapShare, campaign_of, determined_combinations, marginal_of
-from .map_files import read_map
-from .model import Prior, Probe
-from .sections import MapPriorSettings
-from .volumes import check_within
+from ballplate.simulator.design import Machine, References, Volume
+from ballplate.simulator.experiment import MapPriorSettings, Prior, Probe, check_within, read_map
+from ballplate.simulator.geometry import even_grid
+from ballplate.simulator.inputs import (
+    ExperimentError,
+    Steps,
+    format_path,
+    listing,
+    mark_of,
+    parse_day,
+)
+from ballplate.simulator.machines import Array, ErrorModel
+from ballplate.simulator.maps import (
+    FittedMap,
+    MapShare,
+    campaign_of,
+    determined_combinations,
+    marginal_of,
+)
 
 YEAR = 365.25
 # The same corrections, in metres, and in parts of them.
 SAME, SAME_PART = 1e-12, 1e-9
-
-
-def read_true_map(truth: TrueMapSettings, machine: Machine | None, references: References) -> None:
-    """Let the true machine be that of its map, or report its faults."""
-    steps = ("true_machine", "file")
-    true_map = _read(truth.file, steps, references)
-    if true_map is None:
-        return
-    a = true_map.values
-    if truth.draw is not None:
-        generator = np.random.default_rng(np.random.SeedSequence(truth.draw))
-        root = true_map.root
-        a = a + (root @ generator.standard_normal(root.shape[1]))[: len(a)]
-    content = hashlib.sha256(read_bytes(references.file(truth.file))).hexdigest()
-    truth.set_machine(TrueMachine(true_map.model, a), content)
-    if true_map.undetermined.shape[1]:
-        text = (
-            f"has {true_map.undetermined.shape[1]} undetermined directions, in which the true"
-            " machine keeps arbitrary values of the fit"
-        )
-        references.problems.doubt(steps, text)
-    if machine is None:
-        return
-    if machine.dimension != true_map.dimension:
-        text = f"is of {true_map.dimension} axes, but machine.volume of {machine.dimension}"
-        references.problems.add(steps, f"{text}; name another map")
-        return
-    check_within(*true_map.volume.corners, machine, steps, references)
 
 
 def resolve_map_prior(
@@ -72,7 +46,7 @@ def resolve_map_prior(
     parameter scaled by its effect: as many as the map determines.
     """
     problems, of_file = references.problems, (*steps, "file")
-    fitted = _read(settings.file, of_file, references)
+    fitted = read_named(settings.file, of_file, references)
     years = None if fitted is None else _years(settings, fitted, steps, references)
     if fitted is None or years is None or not _is_same(fitted, model, machine, of_file, references):
         return []
@@ -128,7 +102,7 @@ def resolve_map_prior(
     return priors
 
 
-def _read(file: str, steps: Steps, references: References) -> FittedMap | None:
+def read_named(file: str, steps: Steps, references: References) -> FittedMap | None:
     try:
         fitted = read_map(references.file(file), references.trust)
     except ExperimentError as error:

@@ -12,10 +12,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-
-from ..computing.decompositions import lstsq
-from ..geometry.motions import cross_matrices
-from .protocol import Array, ErrorModel, Parameter, Reported, TrueMachine, Unit
+from ballplate.simulator.computing import lstsq
+from ballplate.simulator.geometry import cross_matrices
+from ballplate.simulator.machines import Array, ErrorModel, Parameter, Reported, TrueMachine, Unit
 
 # Number of random points of the comparison, and their largest probe offset in metres.
 POINTS, OFFSET = 400, 0.1

@@ -12,11 +12,17 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
-
-from .arrangement import AXES
-from .error_names import ERRORS, SQUARENESS_ERRORS
-from .kinematic import KinematicModel
-from .protocol import Array, Line, Parameter, Reported, Unit
+from ballplate.simulator.machines import (
+    AXES,
+    ERRORS,
+    SQUARENESS_ERRORS,
+    Array,
+    KinematicModel,
+    Line,
+    Parameter,
+    Reported,
+    Unit,
+)
 
 # Component, factor and exponents of x, y and z.
 Term = tuple[int, float, tuple[int, int, int]]

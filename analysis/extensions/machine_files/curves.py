@@ -12,16 +12,18 @@ from functools import cached_property
 from typing import ClassVar, Literal
 
 import numpy as np
-
-from ..splines.polynomial_pieces import pieces
-from ..splines.space import SplineSpace
-from ..splines.spline_fit import SplineFit, fit
-from .arrangement import Arrangement
-from .bases import SingleFunction
-from .error_names import AXIS_ERRORS
-from .kinematic import ErrorFunction, KinematicModel
-from .plane import PlaneModel, in_space
-from .protocol import Array, ErrorModel
+from ballplate.simulator.machines import (
+    AXIS_ERRORS,
+    Arrangement,
+    Array,
+    ErrorFunction,
+    ErrorModel,
+    KinematicModel,
+    PlaneModel,
+    SingleFunction,
+    in_space,
+)
+from ballplate.simulator.splines import SplineFit, SplineSpace, fit, pieces
 
 Interpolation = Literal["linear", "cubic", "monotone"]
 NAMES = tuple(AXIS_ERRORS)
