@@ -7,7 +7,7 @@ on error models and on certificates.
 
 from __future__ import annotations
 
-from .simulator.design.observations.python_values import BallFunctions
+from .simulator.design.observations.balls import BallFunctions
 from .simulator.machines.protocol import Array, ErrorModel, Parameter, Reported, Unit
 
 __all__ = ["Array", "BallFunctions", "ErrorModel", "Parameter", "Reported", "Unit"]

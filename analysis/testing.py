@@ -18,7 +18,7 @@ from ballplate.simulator.design.arrays import (
     nominal_state,
 )
 from ballplate.simulator.design.influences.protocol import Influence
-from ballplate.simulator.design.observations.python_values import BallFunctions
+from ballplate.simulator.design.observations.balls import BallFunctions
 from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.gauss_newton import moved
 from ballplate.simulator.machines.protocol import Array, ErrorModel

@@ -35,6 +35,12 @@ SHIPPED = (
         },
     ),
     _here(
+        "own_models",
+        services=_from("custom", "module_source", "module_file"),
+        calibrations={"python": "python_values"},
+        error_models={"python": "python_model"},
+    ),
+    _here(
         "machine_files",
         services={
             **_from("map_priors", "resolve_map_prior"),

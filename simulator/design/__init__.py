@@ -33,14 +33,20 @@ if TYPE_CHECKING:
     )
     from .lookup import Indices, References, lengths_per_axis
     from .objects import SLIGHTLY, Flags, Machine, Tasks, Volume
-    from .observations.balls import BallObservations
+    from .observations.balls import BallFunctions, BallObservations
     from .observations.calibration import (
         FAR_FROM_DRAWING,
+        MOST_TIED_BALLS,
         Calibration,
         CertifiedValue,
         far_from_drawing,
     )
-    from .observations.coordinates import CalibratedCoordinates, CoordinateCalibration
+    from .observations.certificate_tables import read_rows
+    from .observations.coordinates import (
+        CalibratedBalls,
+        CalibratedCoordinates,
+        CoordinateCalibration,
+    )
     from .observations.distances import (
         CalibratedDistances,
         DistanceCalibration,
@@ -58,7 +64,6 @@ if TYPE_CHECKING:
         length_whitening,
     )
     from .observations.priors import Priors
-    from .observations.python_values import PythonCalibration
     from .observations.radius import RadiusCalibration
     from .observations.readings import (
         expected_readings,
@@ -69,8 +74,23 @@ if TYPE_CHECKING:
         seen_places,
     )
     from .observations.star import Stars
-    from .observations.stated_values import CertificateEntry, FileValues, value_name
-    from .observations.whitening import EXACT, CovarianceRoot, Whitening
+    from .observations.stated_values import (
+        CertificateEntry,
+        CertificateSettings,
+        FileValues,
+        check_keys,
+        is_digital,
+        read_digital,
+        uncertainties_of,
+        value_name,
+    )
+    from .observations.whitening import (
+        EXACT,
+        CovarianceRoot,
+        Whitening,
+        at_least_exact,
+        covariance_root,
+    )
     from .parameters import SharedLayout, shared_layout
 
 __getattr__, __dir__ = lazily(__name__, __file__)

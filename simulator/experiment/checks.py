@@ -24,9 +24,8 @@ from ..inputs.problems import Problems, written_text
 from ..inputs.quantities import format_length
 from ..inputs.settings import listing, number_of
 from ..inputs.yamltree import Mark
-from ..machines.custom import CustomModelError
+from ..machines.model_kinds import CustomModelError
 from ..machines.settings import (
-    PythonSettings,
     build_error_model,
     kind_of,
 )
@@ -70,7 +69,7 @@ def _check_model(
     except ExperimentError as error:
         references.problems.take(error, (*steps, "file"))
         return False
-    if isinstance(settings, PythonSettings):
+    if kind.is_code:
         if machine is None:
             return True
         try:

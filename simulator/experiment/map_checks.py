@@ -16,10 +16,9 @@ from ..inputs.validation import validated
 from ..inputs.yamltree import Mapping as MappingNode
 from ..inputs.yamltree import Node, to_python
 from ..inputs.yamltree import Sequence as SequenceNode
-from ..machines.custom import CustomModelError
+from ..machines.model_kinds import CustomModelError
 from ..machines.protocol import Array, ErrorModel
 from ..machines.settings import (
-    PythonSettings,
     build_error_model,
     kind_of,
 )
@@ -125,7 +124,7 @@ def _model(
         for below, text in wrong:
             problems.add(("error_model", *below), text)
         # What is not to be run is refused where the model is made.
-        may_look = trust.modules or not isinstance(model_settings, PythonSettings)
+        may_look = trust.modules or not kind.is_code
         if wrong or may_look and not _has_its_files(settings, folder, problems):
             return None
         return build_error_model(model_settings, *volume.corners)

@@ -10,8 +10,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from ..inputs.extensions import service
 from ..inputs.yamltree import child, read_bytes, read_tree, to_python
-from ..machines.custom import module_source
 
 # Keys of settings of error models that name a file or a folder, by the kind of the model.
 PLACES = {"machine": "file", "python": "folder"}
@@ -56,7 +56,9 @@ def model_files(settings: Mapping[str, Any]) -> dict[str, Path]:
         return {path.name: path, **{name: path.parent / name for name in tables}}
     if settings["kind"] == "python":
         folder = settings.get("folder")
-        file = module_source(settings["object"], None if folder is None else Path(folder))
+        file = service("module_source")(
+            settings["object"], None if folder is None else Path(folder)
+        )
         return {} if file is None else {file.name: file}
     return {}
 

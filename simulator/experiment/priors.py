@@ -16,7 +16,7 @@ from ..inputs.number_arrays import Array
 from ..inputs.quantities import PARSERS, QuantityError
 from ..inputs.settings import hint, shorten
 from ..inputs.yamltree import mark_of
-from ..machines.custom import CustomModelError
+from ..machines.model_kinds import CustomModelError
 from ..machines.protocol import ErrorModel, Unit
 from ..machines.settings import build_error_model, kind_of
 from .model import Position, Prior, Probe

@@ -40,6 +40,14 @@ if TYPE_CHECKING:
     )
     from .module_finder import own_modules
     from .number_arrays import Array, Flags, Integers
+    from .own_code import (
+        OwnCodeError,
+        error_text,
+        own_array,
+        own_frame,
+        own_result,
+        running_own_code,
+    )
     from .problems import Problems, in_order, written_count, written_text
     from .quantities import (
         ANGLE_UNITS,
@@ -83,6 +91,7 @@ if TYPE_CHECKING:
         parse_ratio,
         plain_unit,
         typed_length,
+        with_quantities,
     )
     from .room_parts import Place, RoomPart, length_of, place_text
     from .settings import (

@@ -17,7 +17,6 @@ if TYPE_CHECKING:
         arrangement_of,
     )
     from .bases import Basis, Polynomial, SingleFunction, Spline
-    from .custom import module_file, module_source
     from .empirical_settings import EmpiricalSettings
     from .error_names import (
         AXIS_ERRORS,
@@ -31,7 +30,7 @@ if TYPE_CHECKING:
     from .kinematic import ErrorFunction, KinematicModel, carried_vectors, error_function
     from .kinematic_settings import KinematicSettings
     from .metric import MetricModel, Scale
-    from .model_kinds import Corner, ErrorModelKind
+    from .model_kinds import Corner, CustomModelError, ErrorModelKind
     from .plane import PlaneModel, in_space
     from .protocol import (
         Array,
@@ -46,7 +45,6 @@ if TYPE_CHECKING:
     )
     from .settings import (
         MetricSettings,
-        PythonSettings,
         build_error_model,
     )
     from .spatial_metric import SpatialMetricModel, parameters_of_metric

@@ -10,9 +10,18 @@ from typing import Any
 from ..inputs.messages import Steps
 from ..inputs.settings import Settings
 from ..inputs.trust import Trust
+from ..inputs.unusable import UnusableError
 from .protocol import ErrorModel
 
 Corner = tuple[float, ...]
+
+
+class CustomModelError(UnusableError, ValueError):
+    """A user's error model is unusable; `key` is the key at fault, "object" or "options"."""
+
+    def __init__(self, text: str, key: str = "object") -> None:
+        self.key = key
+        super().__init__(text)
 
 
 @dataclass(frozen=True)
@@ -23,7 +32,7 @@ class ErrorModelKind:
     `dimensions` lists the possible numbers of co-ordinates. `wrong` returns faults of the settings
     for a number of dimensions as (path in the settings, text) pairs; `with_defaults` states
     defaults that depend on this number. `read` completes the settings from files, found from the
-    folder of the experiment; it raises ExperimentError.
+    folder of the experiment; it raises ExperimentError. What `is_code` is run to be built.
     """
 
     settings: type[Settings]
@@ -32,3 +41,4 @@ class ErrorModelKind:
     wrong: Callable[[Any, int], Iterable[tuple[Steps, str]]] = lambda settings, dimension: ()
     with_defaults: Callable[[Any, int], Settings] = lambda settings, dimension: settings
     read: Callable[[Any, Path, Trust], None] = lambda settings, folder, trust: None
+    is_code: bool = False

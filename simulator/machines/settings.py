@@ -6,17 +6,14 @@ A new error model of the kernel is one file with its keys and an `ErrorModelKind
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args
 
-from pydantic import Field, PrivateAttr, StringConstraints
+from pydantic import Field
 
 from ..inputs.extensions import provided
 from ..inputs.messages import Steps
 from ..inputs.open_kinds import OpenKinds
 from ..inputs.settings import Settings, listing
-from ..inputs.trust import UNKNOWN, Trust
-from .custom import custom_model
 from .empirical_settings import EMPIRICAL
 from .kinematic_settings import KINEMATIC
 from .metric import MetricModel, Scale
@@ -46,39 +43,6 @@ class MetricSettings(Settings):
         return "none" if self.scale is None or self.scale == "each" else self.scale
 
 
-class PythonSettings(Settings):
-    """A user's own error model, made by a Python function from the volume's corners and the
-    options.
-    """
-
-    kind: Literal["python"] = Field(description="a model of the user's own")
-    object: Annotated[str, StringConstraints(min_length=1)] = Field(
-        description=(
-            "module:function, the module installed or in this file's folder, or the name of an"
-            " installed entry point of the group ballplate.error_models."
-        )
-    )
-    options: dict[str, Any] = Field(
-        default={}, description="Keyword arguments of the function; quantities arrive in SI units."
-    )
-
-    folder: str | None = Field(
-        default=None,
-        description=("Folder of the module, relative to this file; default: that of this file."),
-    )
-
-    # An additional folder of modules.
-    _folder: Path | None = PrivateAttr(default=None)
-    _trust: Trust = PrivateAttr(default=UNKNOWN)
-
-    def beside(self, folder: Path, trust: Trust) -> None:
-        """Search modules also in the experiment file's folder, or the stated one relative to
-        it.
-        """
-        self._folder = folder if self.folder is None else folder / self.folder
-        self._trust = trust
-
-
 def _metric(settings: MetricSettings, lower: Corner, upper: Corner) -> ErrorModel:
     if len(lower) == 3:
         return SpatialMetricModel(settings.scale != "none", lower, upper)
@@ -99,19 +63,12 @@ def _metric_with_defaults(settings: MetricSettings, dimension: int) -> MetricSet
     return settings.model_copy(update={"scale": "none" if dimension == 2 else "each"})
 
 
-def _python(settings: PythonSettings, lower: Corner, upper: Corner) -> ErrorModel:
-    return custom_model(
-        settings.object, settings.options, settings._folder, settings._trust, lower, upper
-    )
-
-
 ERROR_MODELS: tuple[ErrorModelKind, ...] = (
     KINEMATIC,
     EMPIRICAL,
     ErrorModelKind(
         MetricSettings, _metric, wrong=_wrong_metric, with_defaults=_metric_with_defaults
     ),
-    ErrorModelKind(PythonSettings, _python, read=PythonSettings.beside),
 )
 """The kernel's types of error model."""
 

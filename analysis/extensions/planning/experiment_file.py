@@ -15,8 +15,14 @@ from ballplate.simulator.experiment import (
     Position,
     TimesSettings,
 )
-from ballplate.simulator.inputs import format_duration, in_one_line, to_list, to_python, yaml_text
-from ballplate.simulator.machines import module_file
+from ballplate.simulator.inputs import (
+    format_duration,
+    in_one_line,
+    service,
+    to_list,
+    to_python,
+    yaml_text,
+)
 
 from .pools import READING, SET_UP
 
@@ -172,7 +178,7 @@ def _moved(content: dict[str, Any], source: Path, folder: Path) -> dict[str, Any
             return settings
         beside = settings.get("folder", ".")
         module = str(settings["object"]).partition(":")[0]
-        if module_file((source / beside).resolve(), module) is None:
+        if service("module_file")((source / beside).resolve(), module) is None:
             return settings
         return {**settings, "folder": there(beside)}
 

@@ -12,10 +12,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.design import PythonCalibration
 from ballplate.simulator.experiment import Experiment
-from ballplate.simulator.machines import PythonSettings, module_source
 from pydantic import BaseModel
+
+from ..own_models import PythonCalibration, PythonSettings, module_source
 
 # Without influence on the result: names, positions in files, and how data were read.
 LEFT_OUT = frozenset(

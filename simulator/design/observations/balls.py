@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Self
+from typing import Protocol, Self
 
 import numpy as np
 
 from ...computing.decompositions import svd
 from ...inputs.number_arrays import Flags
-from ...machines.protocol import Array, ErrorModel
+from ...machines.protocol import Array, ErrorModel, Unit
 from ..arrays import Design, Observations, Replicates, Rows, State
 from .whitening import EXACT
 
@@ -81,3 +81,23 @@ class BallObservations(Observations):
         residual = (value - self.values(at.truth.balls)[0] - errors) / self.uncertainty
         at.squares[:] += (residual**2).sum(axis=1)
         at.pull(self.balls, (residual / self.uncertainty)[:, :, None, None] * slope)
+
+
+class BallFunctions(Protocol):
+    """Functions of the balls of an artefact whose values a certificate states.
+
+    `names` are two names for each of the m values, by which files find it. Values are in `unit`: m,
+    rad or 1. They must not depend on where the artefact's frame is.
+    """
+
+    @property
+    def names(self) -> tuple[tuple[str, str], ...]: ...
+
+    @property
+    def unit(self) -> Unit: ...
+
+    def values(self, balls: Array) -> Array:
+        """Values (m,) where balls are at `balls` (n, d), in metres."""
+
+    def derivatives(self, balls: Array) -> Array:
+        """Derivatives (m, n, d) of the values by the co-ordinates of the balls."""

@@ -17,14 +17,12 @@ from ..lookup import References
 from .calibration import Calibration
 from .coordinates import CoordinatesSettings, read_coordinates
 from .distances import DistancesSettings, read_distances
-from .python_values import PythonValuesSettings, read_python_values
 from .radius import RadiusSettings, read_radius
 
 CALIBRATIONS: dict[type[Settings], Callable[[Any, str, Steps, References], Calibration | None]] = {
     DistancesSettings: read_distances,
     CoordinatesSettings: read_coordinates,
     RadiusSettings: read_radius,
-    PythonValuesSettings: read_python_values,
 }
 """Settings class of every kind of calibration, with what reads it for an artefact: the item, or
 None after saying what is wrong.

@@ -5,59 +5,46 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, Literal, Protocol
+from typing import Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field
-
-from ...geometry.ball_layouts import BallLayout, Name, frozen
-from ...inputs.messages import Steps
-from ...inputs.own_code import own_array
-from ...inputs.quantities import (
-    PARSERS,
-    QuantityError,
-    with_quantities,
-)
-from ...inputs.settings import Forms, NonEmpty, Text, listing
-from ...inputs.trust import Trust
-from ...machines.custom import CustomModelError, attempt, named_object
-from ...machines.protocol import Array, Integers, Unit
-from ..arrays import Design
-from ..lookup import References
-from .balls import BallObservations
-from .calibration import MOST_TIED_BALLS, Calibration
-from .certificate_tables import read_rows
-from .coordinates import CalibratedBalls
-from .stated_values import (
+from ballplate.simulator.design import (
+    MOST_TIED_BALLS,
+    BallFunctions,
+    BallObservations,
+    CalibratedBalls,
+    Calibration,
     CertificateSettings,
+    CovarianceRoot,
+    Design,
+    References,
+    at_least_exact,
     check_keys,
+    covariance_root,
     is_digital,
     read_digital,
+    read_rows,
     uncertainties_of,
 )
-from .whitening import CovarianceRoot, at_least_exact, covariance_root
+from ballplate.simulator.geometry import BallLayout, Name, frozen
+from ballplate.simulator.inputs import (
+    PARSERS,
+    Forms,
+    NonEmpty,
+    QuantityError,
+    Steps,
+    Text,
+    Trust,
+    listing,
+    own_array,
+    with_quantities,
+)
+from ballplate.simulator.machines import Array, CustomModelError, Integers, Unit
+from pydantic import Field
+
+from .custom import attempt, named_object
 
 GROUP = "ballplate.calibrations"
-
-
-class BallFunctions(Protocol):
-    """Functions of the balls of an artefact whose values a certificate states.
-
-    `names` are two names for each of the m values, by which files find it. Values are in `unit`: m,
-    rad or 1. They must not depend on where the artefact's frame is.
-    """
-
-    @property
-    def names(self) -> tuple[tuple[str, str], ...]: ...
-
-    @property
-    def unit(self) -> Unit: ...
-
-    def values(self, balls: Array) -> Array:
-        """Values (m,) where balls are at `balls` (n, d), in metres."""
-
-    def derivatives(self, balls: Array) -> Array:
-        """Derivatives (m, n, d) of the values by the co-ordinates of the balls."""
 
 
 @dataclass(frozen=True)
@@ -158,7 +145,10 @@ class PythonValuesSettings(CertificateSettings):
     )
 
 
-def read_python_values(
+SETTINGS = PythonValuesSettings
+
+
+def read(
     settings: PythonValuesSettings, artefact: str, steps: Steps, references: References
 ) -> PythonCalibration | None:
     layout, dimension = references.layouts[artefact], references.dimension

@@ -15,21 +15,27 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-
-from ..inputs.module_finder import own_modules
-from ..inputs.own_code import (
+from ballplate.simulator.inputs import (
     OwnCodeError,
+    Trust,
     error_text,
+    hint,
+    listing,
     own_array,
     own_frame,
+    own_modules,
     own_result,
     running_own_code,
+    with_quantities,
 )
-from ..inputs.quantities import with_quantities
-from ..inputs.settings import hint, listing
-from ..inputs.trust import Trust
-from ..inputs.unusable import UnusableError
-from .protocol import Array, ErrorModel, Line, Parameter, Reported
+from ballplate.simulator.machines import (
+    Array,
+    CustomModelError,
+    ErrorModel,
+    Line,
+    Parameter,
+    Reported,
+)
 
 GROUP = "ballplate.error_models"
 MEMBERS = ("dimension", "parameters", "error", "jacobian", "reported")
@@ -40,14 +46,6 @@ USUAL_ERROR = 1e-4
 IMPLAUSIBLE = 0.1
 
 Result = TypeVar("Result")
-
-
-class CustomModelError(UnusableError, ValueError):
-    """A user's error model is unusable; `key` is the key at fault, "object" or "options"."""
-
-    def __init__(self, text: str, key: str = "object") -> None:
-        self.key = key
-        super().__init__(text)
 
 
 def custom_model(
