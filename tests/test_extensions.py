@@ -34,6 +34,8 @@ BUILDS_ON = {
     ("reproduction", "estimators"): "published comparisons of estimators are reproduced",
     ("diagnosis", "influences"): "influences that are not stated are searched in readings",
     ("maps", "diagnosis"): "certificates in common act on fits as gross errors do",
+    ("maps", "machine_files"): "machine files are maps that are drawn and compared, too",
+    ("sweeps", "own_models"): "a case is another one where the user's own code differs",
     ("campaign", "planning"): "run sheets are of the steps of a plan, and plans begun are read",
     ("requirements", "planning"): "the hours that meet a target are those of plans",
     ("repair", "planning"): "what repairs a design is chosen as positions of a plan are",
@@ -225,6 +227,9 @@ OPTIONS = {
     "campaign": (["plan", "POOL", "--positions", "6", "--sheet", "sheet.html"],),
     "laboratory": (["fit", "designs/quickstart.yaml", "designs/reports/z-low.dmo"],),
     "influences": (["check", "tests/cli/files/effects.yaml"],),
+    "planning": (["check", "POOL"],),
+    "machine_files": (["check", "designs/park/plate.yaml"],),
+    "own_models": (["check", "OWN"],),
     "estimators": (["fit", "designs/quickstart.yaml", "READINGS", "--estimator", "distances"],),
     "sweeps": (["schema", "sweep"],),
     "maps": (["map", "designs/park/machines/npl-like.yaml", "--curves"],),
@@ -278,7 +283,10 @@ def test_an_option_names_the_extension_that_it_needs(
 ) -> None:
     quickstart = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
     places = {"POOL": tmp_path / "pool.yaml", "READINGS": tmp_path / "readings.csv"}
+    places["OWN"] = tmp_path / "own.yaml"
     places["POOL"].write_text(quickstart + POOL, encoding="utf-8")
+    own = quickstart.replace("kind: kinematic", "kind: python")
+    places["OWN"].write_text(own, encoding="utf-8")
     bp.simulate("designs/quickstart.yaml").to_csv(places["READINGS"], index=False)
     words = [
         str(places.get(word, tmp_path / word if "." in word[-5:] and "/" not in word else word))
