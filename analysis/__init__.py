@@ -24,11 +24,9 @@ if TYPE_CHECKING:
         check,
         experiment,
         fit,
-        load_map,
         quickstart,
         run,
         simulate,
-        write_map,
     )
     from ballplate.arguments import load, load_all
     from ballplate.extensions.assumptions.interface import assumptions
@@ -40,6 +38,8 @@ if TYPE_CHECKING:
     from ballplate.extensions.information.interface import information
     from ballplate.extensions.judgement.interface import budget, compare_models, validate
     from ballplate.extensions.laboratory.interface import read_report
+    from ballplate.extensions.machine_files.fitted_map import FittedMap
+    from ballplate.extensions.machine_files.interface import load_map, write_map
     from ballplate.extensions.maps.interface import (
         correct,
         curves,
@@ -88,7 +88,6 @@ if TYPE_CHECKING:
     from ballplate.simulator.inputs.quantities import Target, parse_length
     from ballplate.simulator.inputs.trust import Trust
     from ballplate.simulator.machines.protocol import ErrorModel
-    from ballplate.simulator.maps.fitted_map import FittedMap
     from ballplate.uncertainty.kernel_quantities import QuantityKind
     from ballplate.uncertainty.quantities import QUANTITIES
 

@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     from .presentation.result import FitResult
     from .results.fits import Fit
     from .results.prediction import Prediction
-    from .simulator.maps.fitted_map import FittedMap
 
 
 def experiment(sections: Mapping[str, Any], folder: PathLike = ".") -> Experiment:
@@ -294,38 +293,3 @@ def fit(
         scale,
         offsets,
     )
-
-
-def load_map(path: PathLike) -> FittedMap:
-    """The map of a file that a fit left behind.
-
-    >>> from tempfile import TemporaryDirectory
-    >>> with TemporaryDirectory() as folder:
-    ...     path = f"{folder}/map.yaml"
-    ...     write_map(fit(quickstart(), simulate(quickstart())).to_map(), path)
-    ...     load_map(path)
-    <FittedMap 5 x 5 ball plate in six positions: 69 parameters>
-    """
-    from .simulator.experiment.map_files import read_map
-
-    ensure_path("path", path)
-    return read_map(path)
-
-
-def write_map(fitted: FittedMap, path: PathLike) -> None:
-    """Write what `to_map()` of a fit gives into a file in YAML. Numbers keep all their digits; a
-    file of that name is overwritten.
-
-    >>> from tempfile import TemporaryDirectory
-    >>> with TemporaryDirectory() as folder:
-    ...     path = f"{folder}/map.yaml"
-    ...     write_map(fit(quickstart(), simulate(quickstart())).to_map(), path)
-    ...     load_map(path).degrees_of_freedom
-    580
-    """
-    from .simulator.experiment import map_files
-    from .simulator.maps.fitted_map import FittedMap
-
-    ensure_type(FittedMap, "what to_map() of a fit gives", fitted=fitted)
-    ensure_path("path", path)
-    map_files.write_map(fitted, path)

@@ -19,10 +19,7 @@ PathLike = str | os.PathLike[str]
 
 if TYPE_CHECKING:
     import pandas
-    from ballplate.simulator.maps.fitted_map import FittedMap
     from ballplate.simulator.readings.observed_readings import ObservedReadings
-
-    from .results.fits import Fit
 
     # A table of readings, or several; None for those that the experiment names.
     Tables: TypeAlias = PathLike | pandas.DataFrame | Sequence[PathLike | pandas.DataFrame] | None
@@ -120,31 +117,3 @@ def observed_of(
         chosen = read(table_of("certificate", certificate), chosen)
     observed = read_readings(tables, lay_out(chosen), settings=chosen.readings)
     return chosen, replace(observed, certificate_doubts=chosen.doubts[doubt_count:])
-
-
-def fit_map_or_path(name: str, fitted: Fit | FittedMap | PathLike) -> Fit | FittedMap | Path:
-    """A map to be compared: the path of a file as such."""
-    from .results.fits import Fit
-    from .simulator.maps.fitted_map import FittedMap
-
-    if isinstance(fitted, str | os.PathLike):
-        return Path(fitted)
-    if not isinstance(fitted, Fit | FittedMap):
-        raise TypeError(f"{name}={fitted!r}; give a fit, what its to_map() gives, or a path")
-    return fitted
-
-
-def map_or_path(name: str, fitted: Fit | FittedMap | PathLike) -> FittedMap | Path:
-    """Return the map of a fit, or a given map or path unchanged."""
-    from .results.fits import Fit
-
-    side = fit_map_or_path(name, fitted)
-    return side.to_map() if isinstance(side, Fit) else side
-
-
-def fitted_map_of(name: str, fitted: Fit | FittedMap | PathLike) -> FittedMap:
-    """Return the map of a fit, of its to_map(), or of a file."""
-    loaded_map = map_or_path(name, fitted)
-    from ballplate.simulator.experiment.map_files import read_map
-
-    return read_map(loaded_map) if isinstance(loaded_map, Path) else loaded_map

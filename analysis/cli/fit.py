@@ -6,6 +6,8 @@ from argparse import ArgumentParser, Namespace
 from functools import partial
 from pathlib import Path
 
+from ballplate.simulator.inputs.extensions import service
+
 from ..results.estimator_choice import (
     DRAWN,
     ESTIMATORS,
@@ -95,10 +97,7 @@ def _add_estimators(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Fit one experiment; 1 if there is something to complain of."""
-    from ballplate.simulator.experiment.map_files import write_map
-
     from ..results.fits import Fit
-    from ..results.map_of_fit import left_out_words
     from .common import show
 
     _refuse_misused(options)
@@ -119,10 +118,10 @@ def run(options: Namespace) -> int:
         contents[options.plot] = result.plot
     if options.output and isinstance(result, Fit) and result.converged:
         fitted = result.to_map(options.date)
-        contents[options.output] = partial(write_map, fitted)
+        contents[options.output] = partial(service("write_map"), fitted)
     write(options, contents)
     if options.output and options.output in contents and fitted.left_out:
-        warn([left_out_words(fitted)])
+        warn([service("left_out_words")(fitted)])
     show(options, result)
     if isinstance(result, Fit):
         note_singular_values(options, result.verdict)

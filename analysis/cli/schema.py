@@ -38,10 +38,4 @@ def _experiment() -> dict[str, Any]:
     return schema()
 
 
-def _map() -> dict[str, Any]:
-    from ballplate.simulator.experiment.map_sections import map_schema
-
-    return map_schema()
-
-
-SCHEMAS = {"experiment": _experiment, "map": _map}
+SCHEMAS = {"experiment": _experiment}

@@ -45,8 +45,12 @@ SHIPPED = (
         services={
             **_from("map_priors", "resolve_map_prior"),
             **_from("fitted_machine", "machine_of_file"),
+            **_from("map_of_fit", "map_of", "counted_twice", "left_out_words"),
+            **_from("map_files", "write_map"),
+            **_from("sigmas_by_campaign", "campaign_sigmas"),
         },
-        schemas={"machine": "machine_sections"},
+        functions=_from("interface", "load_map", "write_map") | _from("fitted_map", "FittedMap"),
+        schemas={"machine": "machine_sections", "map": "map_sections"},
         error_models={"machine": "fitted_machine"},
         true_machines={
             "curves": "measured_curves",

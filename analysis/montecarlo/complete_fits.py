@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.lengths import Lengths
-from ballplate.simulator.estimation.gauss_newton import Solution, gauss_newton
+from ballplate.simulator.estimation.gauss_newton import Solution, iterate
 from ballplate.simulator.estimation.initial import initial_state
 from ballplate.simulator.machines.protocol import Array
 
@@ -24,7 +24,7 @@ def complete_fit(
     """
     design, x = replicate_data(shared, moved, errors, ends)
     held_spectrum = shared.spectrum if shared.drawn is None else shared.drawn.spectrum
-    return gauss_newton(design, x, initial_state(design, x), held_spectrum=held_spectrum)
+    return iterate(design, x, initial_state(design, x), held_spectrum=held_spectrum)
 
 
 def replicate_data(

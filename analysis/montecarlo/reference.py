@@ -11,7 +11,7 @@ from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.design.observations.readings import reading_blocks, reading_weights
 from ballplate.simulator.estimation.covariance import Spectrum
 from ballplate.simulator.estimation.elimination import Factor
-from ballplate.simulator.estimation.gauss_newton import gauss_newton
+from ballplate.simulator.estimation.gauss_newton import iterate
 from ballplate.simulator.estimation.initial import initial_state
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers
@@ -140,9 +140,7 @@ def reference(design: Design, truth: Truth) -> Reference:
         )
     )
     held_spectrum = drawn.spectrum if drawn.deficiency else None
-    solution = gauss_newton(
-        observed, exact, initial_state(observed, exact), held_spectrum=held_spectrum
-    )
+    solution = iterate(observed, exact, initial_state(observed, exact), held_spectrum=held_spectrum)
     if solution.status != "converged":
         raise DivergedError(f"the estimate from its readings without noise has {solution.status}")
     start, plates = solution.state, observed.plate_readings

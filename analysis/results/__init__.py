@@ -22,13 +22,13 @@ if TYPE_CHECKING:
     from .error_functions import estimated_curves
     from .estimates import (
         ESTIMATE_COLUMNS,
+        EstimatedFunctions,
         ParameterEstimate,
         labels,
     )
     from .estimator_choice import COMPARED, EstimatorName
     from .fits import Fit
     from .fitting import fit
-    from .map_of_fit import data_of, left_out_words
     from .plates import axes_of_plates
     from .prediction import Prediction
     from .qualifications import (
@@ -39,7 +39,6 @@ if TYPE_CHECKING:
         qualifications_of,
     )
     from .residuals import reading_residuals
-    from .sigmas_by_campaign import campaign_sigmas, with_sigmas
     from .text_blocks import (
         MOST_BALLS,
         adjustment_data,

@@ -29,7 +29,6 @@ from ballplate.results.estimates import (
 from ballplate.results.extension_results import (
     IssuedCertificate,
 )
-from ballplate.results.map_of_fit import counted_twice, map_of
 from ballplate.results.plates import PlateCoordinates
 from ballplate.results.prediction import by_label, length_headline, rank_words
 from ballplate.results.residuals import Residual, reading_residuals, residual_groups
@@ -55,7 +54,7 @@ from ballplate.simulator.inputs.extensions import function, service
 from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.maps.fit_verdict import LackOfFit
-from ballplate.simulator.maps.fitted_map import LEAST_SIGMA
+from ballplate.simulator.maps.map_prior import LEAST_SIGMA
 from ballplate.simulator.readings.given_points import ensure_points, probe_places
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 from ballplate.uncertainty.summaries import Quantity, tasks_of
@@ -63,9 +62,7 @@ from ballplate.uncertainty.tasks import TaskUncertainty
 
 if TYPE_CHECKING:
     import pandas
-    from ballplate.results.sigmas_by_campaign import CampaignSigmas
     from ballplate.simulator.experiment.model import Experiment
-    from ballplate.simulator.maps.fitted_map import FittedMap
     from matplotlib.figure import Figure
 
 
@@ -107,7 +104,7 @@ class Fit(FitResult):
     untested: str = ""
     estimated: EstimatedFunctions | None = None
     experiment: Experiment | None = None
-    campaigns: CampaignSigmas | None = None
+    campaigns: Any | None = None
 
     @property
     def design(self) -> Design:
@@ -339,7 +336,7 @@ class Fit(FitResult):
         probes = probe_places(probe, names, len(checked))
         return correct(self.functions.at, checked, probes, self.sigma)
 
-    def to_map(self, date: str | None = None) -> FittedMap:
+    def to_map(self, date: str | None = None) -> Any:
         """The error map of the fit with its covariance, to be saved and applied; `date` is the day
         of the campaign, such as "2026-11-22".
 
@@ -349,7 +346,7 @@ class Fit(FitResult):
         >>> bp.fit(bp.quickstart(), bp.simulate(bp.quickstart())).to_map()
         <FittedMap 5 x 5 ball plate in six positions: 69 parameters>
         """
-        return map_of(self, date)
+        return service("map_of")(self, date)
 
     def certificate(
         self,
@@ -423,7 +420,10 @@ class Fit(FitResult):
         tests.
         """
         warnings = []
-        twice = counted_twice(self.experiment, self.observed)
+        priors = () if self.experiment is None else self.experiment.priors
+        twice: tuple[str, ...] = ()
+        if any(prior.data is not None for prior in priors):
+            twice = service("counted_twice")(self.experiment, self.observed)
         if twice:
             warnings.append(
                 "the map that is prior knowledge comes from readings that are fitted here too"

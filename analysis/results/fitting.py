@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.extensions import service
 from ballplate.simulator.machines.error_names import SquarenessError
 from ballplate.simulator.machines.kinematic import KinematicModel
 from ballplate.simulator.machines.plane import PlaneModel
@@ -24,7 +25,6 @@ from .estimates import estimated_functions, parameter_estimates
 from .fits import Fit
 from .plates import plate_coordinates
 from .residuals import largest_residuals
-from .sigmas_by_campaign import CampaignSigmas, campaign_sigmas
 
 
 # In one piece: each step of judging an estimate needs those before.
@@ -41,7 +41,9 @@ def fit(
     t, t^2, ... on [0, 1] instead of those of the stable basis.
     """
     is_estimated = (sigma or experiment.sigma) == "estimated"
-    campaigns = campaign_sigmas(experiment, observed) if is_estimated else None
+    campaigns = None
+    if is_estimated and experiment.earlier_campaigns:
+        campaigns = service("campaign_sigmas")(experiment, observed)
     observed = observed if campaigns is None else campaigns.observed
     design = observed.design
     solution = estimate(design, observed.x) if campaigns is None else campaigns.solution
@@ -78,9 +80,7 @@ def fit(
     )
 
 
-def _sigma(
-    at: Linearisation, campaigns: CampaignSigmas | None, is_estimated: bool
-) -> tuple[float, bool, int]:
+def _sigma(at: Linearisation, campaigns: Any | None, is_estimated: bool) -> tuple[float, bool, int]:
     """Return sigma, whether it is estimated, and the degrees of freedom of uncertainties."""
     squares, freedom = at.factor.sum_of_squares, at.degrees_of_freedom
     if campaigns is not None:

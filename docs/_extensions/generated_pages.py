@@ -15,9 +15,9 @@ from typing import Any
 from ballplate.cli import GROUPS
 from ballplate.cli import parser as command_line
 from ballplate.extensions.machine_files.machine_sections import schema as machine_schema
+from ballplate.extensions.machine_files.map_sections import schema as map_schema
 from ballplate.extensions.sweeps.sweep_schema import schema as sweep_schema
 from ballplate.simulator.experiment.json_schema import schema
-from ballplate.simulator.experiment.map_sections import map_schema
 from ballplate.simulator.inputs.quantities import (
     KINDS,
     Angle,

@@ -5,8 +5,8 @@ A page says `<!-- limits of files -->`, of experiments or of commands, where the
 
 from __future__ import annotations
 
-from ballplate.estimators import distances as estimators
 from ballplate.extensions.diagnosis import remainders
+from ballplate.extensions.estimators import distances as estimators
 from ballplate.extensions.maps import correction
 from ballplate.extensions.maps import volumetric_errors as volumetric
 from ballplate.extensions.planning import criteria, information

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from .library_versions import versions
     from .memory import want_of_memory
     from .processes import begin_worker, in_processes, interruptions_blocked, processors, safe_path
-    from .rounding import blank, comparable, first_largest, first_largest_of_columns
+    from .rounding import TOUCHED, blank, comparable, first_largest, first_largest_of_columns
     from .spreading import evenly_spread
     from .steps import EnoughError, ProgressStep, Report, counted, unreported
     from .threads import scipy_linalg, single_threaded

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
         or_unknown,
     )
     from .lookup import Indices, References, lengths_per_axis
-    from .objects import SLIGHTLY, Flags, Machine, Tasks, Volume
+    from .objects import SLIGHTLY, Flags, Machine, Probes, Tasks, Volume
     from .observations.balls import BallFunctions, BallObservations
     from .observations.calibration import (
         FAR_FROM_DRAWING,

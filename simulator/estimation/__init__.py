@@ -32,12 +32,14 @@ if TYPE_CHECKING:
         Status,
         as_drawn,
         estimate,
+        iterate,
         linearised_fit,
         moved,
         newton_step,
     )
     from .graded import Collected, Triangle, triangle
     from .held import holding
+    from .implied_values import implied_count
     from .initial import initial_state
     from .linearisation import LinearFunctions, Linearisation, linearise
     from .spheres import FEWEST_POINTS, FLAT, SphereFit, closest_sphere, fit_sphere

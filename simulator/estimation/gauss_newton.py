@@ -16,7 +16,7 @@ from ..machines.protocol import Array
 from .covariance import Spectrum, no_spectrum, spectrum
 from .elimination import Factor, eliminate
 from .graded import triangle
-from .implied_values import implied_values
+from .implied_values import implied_count
 from .initial import initial_state
 from .linearisation import Linearisation, linearise
 from .substitution import in_order, solve_balls, solve_kept, solve_shared
@@ -70,7 +70,7 @@ class Solution:
 
 
 @single_threaded
-def gauss_newton(
+def iterate(
     design: Design,
     x: Array,
     start: State,
@@ -126,10 +126,10 @@ def estimate(design: Design, x: Array, settings: GaussNewtonSettings | None = No
     """
     start = initial_state(design, x)
     drawn = as_drawn(design)
-    solution_held = gauss_newton(design, x, start, settings, drawn)
+    solution_held = iterate(design, x, start, settings, drawn)
     if not drawn.deficiency or len(design.of(Lengths)):
         return solution_held
-    followed = gauss_newton(design, x, start, settings)
+    followed = iterate(design, x, start, settings)
     went_far = max(iteration.step for iteration in followed.iterations) > NEIGHBOURHOOD
     if followed.status != "converged" or went_far:
         return solution_held
@@ -149,7 +149,7 @@ def _tells_of_open(
     from scipy.special import fdtrc
 
     freedom = design.observation_count - design.parameter_count
-    freedom -= implied_values(design, followed.state)
+    freedom -= implied_count(design, followed.state)
     if freedom <= 0:
         return False
     sum_left = followed.factor.sum_of_squares
@@ -173,7 +173,7 @@ def linearised_fit(design: Design, solution: Solution) -> Linearisation:
     """Return the linearisation at an estimate, with the null directions of the nominal design."""
     drawn = linearise(design) if solution.spectrum.deficiency else None
     layout, state = solution.factor.layout, solution.state
-    implied = implied_values(design, state)
+    implied = implied_count(design, state)
     return Linearisation(design, layout, state, solution.factor, solution.spectrum, drawn, implied)
 
 

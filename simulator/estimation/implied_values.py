@@ -24,7 +24,7 @@ UNSEEN = 1e-4
 LEAST = 1e-9
 
 
-def implied_values(design: Design, state: State) -> int:
+def implied_count(design: Design, state: State) -> int:
     """Return by how many degrees of freedom S^2 has fewer, at a state, because certified values of
     an artefact follow from others.
 

@@ -25,7 +25,6 @@ if TYPE_CHECKING:
     from .json_schema import DRAFT, schema, tidied
     from .layout import lay_out
     from .loading import build, load, trees_of, with_pool
-    from .map_files import is_map_file, read_map
     from .model import (
         AtMost,
         Candidate,
@@ -48,6 +47,7 @@ if TYPE_CHECKING:
         module_files,
         named_in,
     )
+    from .own_sections import check_installed
     from .placements import check_turns, in_lengths, resolve_position
     from .pool import placed_only, with_chosen
     from .pool_sections import (

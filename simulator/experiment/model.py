@@ -24,8 +24,7 @@ from ..inputs.number_arrays import Array
 from ..inputs.quantities import Target
 from ..inputs.trust import UNKNOWN, Trust
 from ..inputs.yamltree import Mark, Node, mark_of, to_python, written
-from ..maps.fitted_map import MapData
-from ..maps.map_prior import EarlierCampaign, MapShare
+from ..maps.map_prior import EarlierCampaign, MapData, MapShare
 from .changes import changed_tree
 from .readings_section import ReadingsSettings, no_settings
 

@@ -22,9 +22,9 @@ if TYPE_CHECKING:
         half_digit,
         matrix_problems,
     )
-    from .days import parse_day, stated_day
+    from .days import Day, parse_day, stated_day
     from .decoding import LINE_END, decoded, refuse_controls, text_and_encoding
-    from .extensions import optional_service, service
+    from .extensions import optional_service, provider, service
     from .faces import lazily as lazily
     from .messages import (
         MORE_ERRORS,

@@ -44,8 +44,11 @@ if TYPE_CHECKING:
         Unit,
     )
     from .settings import (
+        KINDS,
+        ErrorModelSettings,
         MetricSettings,
         build_error_model,
+        kind_of,
     )
     from .spatial_metric import SpatialMetricModel, parameters_of_metric
     from .true_machine_settings import FurtherTrueMachine

@@ -8,14 +8,7 @@ from ballplate.simulator.inputs.faces import lazily
 
 # Public names of this package: extensions import these alone, and its modules are private.
 if TYPE_CHECKING:
-    from .fit_verdict import LackOfFit, verdict_data, verdict_line
-    from .fitted_map import (
-        LEAST_SIGMA,
-        FittedMap,
-        InCommon,
-        MapData,
-        readings_in_common,
-    )
-    from .map_prior import MapShare, campaign_of, determined_combinations, marginal_of
+    from .fit_verdict import LackOfFit, verdict_content, verdict_data, verdict_line
+    from .map_prior import LEAST_SIGMA, EarlierCampaign, MapData, MapShare
 
 __getattr__, __dir__ = lazily(__name__, __file__)

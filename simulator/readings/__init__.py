@@ -8,7 +8,7 @@ from ballplate.simulator.inputs.faces import lazily
 
 # Public names of this package: extensions import these alone, and its modules are private.
 if TYPE_CHECKING:
-    from .fingerprints import position_fingerprints
+    from .fingerprints import fingerprint, position_fingerprints
     from .generate import (
         NoReadingError,
         exact_readings,

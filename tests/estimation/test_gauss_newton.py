@@ -15,7 +15,7 @@ from ballplate.simulator.estimation.gauss_newton import (
     GaussNewtonSettings,
     as_drawn,
     estimate,
-    gauss_newton,
+    iterate,
 )
 from ballplate.simulator.estimation.initial import initial_state
 from ballplate.simulator.geometry.motions import rotation_from_vector
@@ -98,7 +98,7 @@ def test_exact_readings_give_the_truth_back(calibration: str, full: bool) -> Non
     # No position reads all balls.
     seen = readings.ball % 6 != readings.position
     design, x = replace(design, readings=readings.select(seen)), x[seen]
-    solution = gauss_newton(design, x, initial_state(design, x))
+    solution = iterate(design, x, initial_state(design, x))
     assert solution.status == "converged"
     assert len(solution.iterations) <= 5
     steps = [iteration.step for iteration in solution.iterations[1:]]
@@ -162,7 +162,7 @@ def test_what_is_open_is_followed_where_an_f_test_says_so(
     design = replace(design, readings=readings)
     start, drawn = initial_state(design, x), as_drawn(design)
     held, followed = (
-        gauss_newton(design, x, start, None, one).factor.sum_of_squares for one in (drawn, None)
+        iterate(design, x, start, None, one).factor.sum_of_squares for one in (drawn, None)
     )
     freedom = design.observation_count - design.parameter_count
     assert drawn.deficiency == 6
@@ -178,7 +178,7 @@ def test_too_few_iterations_are_a_status() -> None:
     design = design_with("distances")
     readings, x = exact_readings(design, truth_of(design))
     design = replace(design, readings=readings)
-    solution = gauss_newton(design, x, initial_state(design, x), GaussNewtonSettings(iterations=1))
+    solution = iterate(design, x, initial_state(design, x), GaussNewtonSettings(iterations=1))
     assert solution.status == "not converged"
     assert len(solution.iterations) == 2
 

@@ -18,7 +18,7 @@ from ballplate.results.fitting import fit
 from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.elimination import eliminate
-from ballplate.simulator.estimation.gauss_newton import gauss_newton
+from ballplate.simulator.estimation.gauss_newton import iterate
 from ballplate.simulator.estimation.initial import initial_state
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import written_in_python
@@ -112,7 +112,7 @@ def test_estimates_do_not_depend_on_what_stands_in_the_place_of_the_third(tmp_pa
     assert lines[1].endswith(",") and not lines[1].endswith(",,")
     observed = read_readings(path, design)
     from_file = fit(experiment, observed)
-    in_memory = gauss_newton(design, found.x, initial_state(design, found.x))
+    in_memory = iterate(design, found.x, initial_state(design, found.x))
     np.testing.assert_allclose(
         from_file.solution.state.balls, in_memory.state.balls, rtol=0, atol=2e-10
     )

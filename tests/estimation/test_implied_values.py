@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.design.observations.distances import CalibratedDistances
-from ballplate.simulator.estimation.implied_values import implied_values
+from ballplate.simulator.estimation.implied_values import implied_count
 from ballplate.simulator.experiment.layout import lay_out
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
@@ -38,11 +38,11 @@ def test_drawn_distances_follow_from_as_many_as_there_are_co_ordinates(
 ) -> None:
     text = QUICKSTART.replace("pairs: corner sides", f"pairs: {pairs}")
     design = lay_out(loaded(tmp_path, text))
-    assert implied_values(design, nominal_state(design)) == implied
+    assert implied_count(design, nominal_state(design)) == implied
     distances, generator = design.of(CalibratedDistances), np.random.default_rng(1)
     measured = distances.value + distances.errors(generator, 1)[0]
     contradicting = design.observed(distances.given(value=measured))
-    assert not implied_values(contradicting, nominal_state(design))
+    assert not implied_count(contradicting, nominal_state(design))
 
 
 def test_sum_of_squares_is_that_of_the_degrees_of_freedom() -> None:
@@ -94,7 +94,7 @@ def test_too_large_uncertainties_of_distances_tell_nothing_of_readings(factor: f
     measured = distances.value + distances.errors(generator, 1)[0]
     stated = distances.given(value=measured, uncertainty=factor * distances.uncertainty)
     own = nominal_state(design)
-    implied = implied_values(design.observed(stated), own)
+    implied = implied_count(design.observed(stated), own)
     misfit = sum_left(design, distances.given(value=measured)) / factor**2
     assert implied == (round(36 - 15 - misfit) if chi2.cdf(misfit, 21) < 1e-2 else 0)
 

@@ -26,7 +26,7 @@ from ballplate.simulator.design.observations.readings import expected_readings
 from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.covariance import spectrum
 from ballplate.simulator.estimation.elimination import eliminate
-from ballplate.simulator.estimation.gauss_newton import gauss_newton, newton_step
+from ballplate.simulator.estimation.gauss_newton import iterate, newton_step
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
@@ -274,7 +274,7 @@ def test_fits_of_readings_drawn_by_hand(
     count = 50
     for _ in range(count):
         design, x, _, truth = physical(made, generator)
-        found = gauss_newton(design, x, truth)
+        found = iterate(design, x, truth)
         assert found.status == "converged"
         errors.append(found.state.a - truth.a)
         squares.append(found.factor.sum_of_squares)

@@ -22,7 +22,7 @@ from ballplate.results.checked_designs import predict
 from ballplate.simulator.design.arrays import nominal_state
 from ballplate.simulator.design.observations.star import Star, Stars, observed_stars
 from ballplate.simulator.design.parameters import shared_layout
-from ballplate.simulator.estimation.gauss_newton import gauss_newton
+from ballplate.simulator.estimation.gauss_newton import iterate
 from ballplate.simulator.estimation.initial import initial_state
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import written_in_python
@@ -204,7 +204,7 @@ def test_a_star_that_points_elsewhere_is_found(place: str) -> None:
     real = small(positions=every, artefacts={"plate": plate}, probes=written)
     found = simulated_readings(real, exact=True)
     design = lay_out(stated)
-    solution = gauss_newton(design, found.x, initial_state(design, found.x))
+    solution = iterate(design, found.x, initial_state(design, found.x))
     assert solution.status == "converged"
     assert solution.factor.sum_of_squares < 1e-6
     np.testing.assert_allclose(solution.state.probes, tips, rtol=0, atol=1e-10)
@@ -247,7 +247,7 @@ def test_replicates_follow_the_estimator_exactly() -> None:
                 for one, errors in zip(design.observations, drawn_noise.errors, strict=True)
             )
         )
-        solution = gauss_newton(observed, x, shared.start)
+        solution = iterate(observed, x, shared.start)
         moved = found.found.offsets[k]
         assert np.abs(moved).max() > 1e-7
         # To a few millionths of what replicates differ by, as of all else.

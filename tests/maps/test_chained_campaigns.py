@@ -14,8 +14,8 @@ import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.extensions.diagnosis.hat import whitened_residuals
+from ballplate.extensions.machine_files.sigmas_by_campaign import compared
 from ballplate.results.fitting import fit
-from ballplate.results.sigmas_by_campaign import compared
 from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.gauss_newton import moved
 from ballplate.simulator.experiment.layout import lay_out

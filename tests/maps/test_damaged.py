@@ -10,7 +10,7 @@ import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.simulator.maps.fitted_map import FittedMap
+from ballplate.extensions.machine_files.fitted_map import FittedMap
 
 from tests.maps import wording
 from tests.maps.kinds import experiment_of, fit_of, module_of, write_files

@@ -10,11 +10,11 @@ import ballplate as bp
 import numpy as np
 import pandas
 import pytest
+from ballplate.extensions.machine_files.fitted_map import FittedMap
 from ballplate.extensions.sweeps.fingerprint import fingerprint
 from ballplate.results import sigmas_by_campaign as campaign_sigmas
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.maps.fitted_map import FittedMap
 from scipy import stats
 
 from tests.maps import wording

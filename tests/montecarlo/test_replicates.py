@@ -15,7 +15,7 @@ from ballplate.simulator.design.observations.coordinates import CalibratedCoordi
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.design.observations.priors import Priors
-from ballplate.simulator.estimation.gauss_newton import gauss_newton
+from ballplate.simulator.estimation.gauss_newton import iterate
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from ballplate.simulator.machines.metric import MetricModel
 
@@ -217,7 +217,7 @@ def alone(shared: Reference, seed: int, index: int) -> tuple[State, float]:
         replace(given, value=given.value + errors["length"]),
         replace(design.of(Priors), value=design.of(Priors).value + errors["prior"]),
     )
-    solution = gauss_newton(observed, x, start)
+    solution = iterate(observed, x, start)
     return solution.state, solution.factor.sum_of_squares
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from ballplate.extensions.requirements.goals import Goal, check_goal, judge
-from ballplate.results import FEW, Fit, PlannedUncertainty, check, with_sigmas
+from ballplate.results import FEW, Fit, PlannedUncertainty, check
 from ballplate.results import fit as fit_observed
 from ballplate.simulator.computing import Report, counted, single_threaded, unreported
 from ballplate.simulator.estimation import Linearisation, linearise
@@ -17,6 +17,7 @@ from ballplate.simulator.inputs import listing, refused
 from ballplate.simulator.readings import ObservedReadings, Source, read_readings
 from ballplate.uncertainty import uncertainties
 
+from ..machine_files import with_sigmas
 from .next_result import NextStep, Offered
 from .positions_read import groups_taken
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from ballplate.extensions.influences import TemperaturesSettings
 from ballplate.presentation import write_file
-from ballplate.results import Fit, data_of
+from ballplate.results import Fit
 from ballplate.simulator.computing import blank, single_threaded
 from ballplate.simulator.estimation import MICROMETRE, BallPlaces, Linearisation, displacements
 from ballplate.simulator.experiment import Experiment
@@ -20,6 +20,7 @@ from ballplate.simulator.inputs import MOST_NAMES, hint, listing, refused, to_py
 from ballplate.simulator.machines import Array, Integers
 from ballplate.uncertainty import OWN_SCALES, expansion, pairs_of, scale_of
 
+from ..machine_files import data_of
 from .certificate_csv import coordinates_csv, covariance_csv
 from .certificate_files import certified_values
 from .certificate_page import certificate_page

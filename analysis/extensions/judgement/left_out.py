@@ -14,7 +14,6 @@ from typing import Literal
 
 import numpy as np
 from ballplate.extensions.diagnosis.hat import hat_rows, row_count, row_places, whitened_residuals
-from ballplate.results import campaign_sigmas
 from ballplate.simulator.computing import (
     ProgressStep,
     Report,
@@ -44,6 +43,7 @@ from ballplate.simulator.machines import Array, Integers
 from ballplate.simulator.maps import LEAST_SIGMA
 from ballplate.simulator.readings import ObservedReadings
 
+from ..machine_files import campaign_sigmas
 from .lack_of_fit import chance_of
 from .left_out_result import LengthDifference, PredictedPosition, PredictedReading, Validation
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.results import Fit, data_of
+from ballplate.results import Fit
 from ballplate.simulator.computing import svd
 from ballplate.simulator.design import Volume
 from ballplate.simulator.geometry import cross_matrices, pose_size
@@ -15,7 +15,7 @@ from ballplate.simulator.machines import Array, ErrorModel, HasLines, PlaneModel
 from ballplate.simulator.maps import LackOfFit, MapData
 from ballplate.simulator.readings import position_fingerprints
 
-from ..machine_files import MachineDescription
+from ..machine_files import MachineDescription, data_of
 from .campaign_tests import EstimatedSigma
 from .volumetric_errors import Volumetric
 

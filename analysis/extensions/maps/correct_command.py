@@ -23,8 +23,8 @@ from .fitted_argument import FITTED, fitted_map
 
 if TYPE_CHECKING:
     from ballplate.simulator.design import Tasks
-    from ballplate.simulator.maps import FittedMap
 
+    from ..machine_files import FittedMap
     from .point_files import GivenPoints
 
 DESCRIPTION = (

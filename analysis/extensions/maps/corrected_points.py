@@ -8,7 +8,8 @@ import numpy as np
 from ballplate.simulator.computing import single_threaded
 from ballplate.simulator.design import offset_sensitivity
 from ballplate.simulator.machines import Array, Integers
-from ballplate.simulator.maps import FittedMap
+
+from ..machine_files import FittedMap
 
 # Points of which derivatives are held at once.
 POINTS_AT_ONCE = 1000

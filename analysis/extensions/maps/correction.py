@@ -17,15 +17,16 @@ from ballplate.presentation import (
     records,
     table_lines,
 )
-from ballplate.results import few_degrees_of_freedom, freedom_words, left_out_words
+from ballplate.results import few_degrees_of_freedom, freedom_words
 from ballplate.simulator.computing import single_threaded
 from ballplate.simulator.design import Flags, Tasks
 from ballplate.simulator.geometry import AXIS_NAMES
 from ballplate.simulator.inputs import CsvWriter, listing, number_of
 from ballplate.simulator.machines import Array
-from ballplate.simulator.maps import FittedMap, verdict_data, verdict_line
+from ballplate.simulator.maps import verdict_data, verdict_line
 from ballplate.uncertainty import stretches
 
+from ..machine_files import FittedMap, left_out_words
 from .corrected_points import corrected_with_blocks, corrected_with_root, tips
 from .mapped_lengths import CorrectedLength, mapped_lengths
 from .point_files import GivenPoints

@@ -19,8 +19,8 @@ from ballplate.presentation import (
     table_lines,
 )
 from ballplate.simulator.geometry import AXIS_NAMES
-from ballplate.simulator.maps import FittedMap
 
+from ..machine_files import FittedMap
 from .error_functions import (
     POSITIONS,
     ErrorFunctions,

@@ -19,9 +19,8 @@ from ballplate.simulator.machines import (
     SquarenessError,
     Unit,
 )
-from ballplate.simulator.maps import FittedMap
 
-from ..machine_files import meaning
+from ..machine_files import FittedMap, meaning
 from .volumetric_errors import AlongAxis, Volumetric, along_axes
 
 # Positions along each line.

@@ -23,11 +23,10 @@ from ballplate.presentation import (
     table_lines,
 )
 from ballplate.simulator.computing import comparable
-from ballplate.simulator.experiment import is_map_file
 from ballplate.simulator.inputs import hint
 from ballplate.simulator.machines import Array
-from ballplate.simulator.maps import FittedMap
 
+from ..machine_files import FittedMap, is_map_file
 from .error_sources import ErrorSource, map_of_source, source_of_machine, source_of_map
 from .fitted_errors import drawn_errors, fitted_errors, fitted_lengths
 from .machine_budget import NOTE, machine_budget

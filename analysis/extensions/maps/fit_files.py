@@ -6,9 +6,11 @@ from pathlib import Path
 from typing import Literal
 
 from ballplate.results import Fit, fit
-from ballplate.simulator.experiment import is_map_file, lay_out, load
+from ballplate.simulator.experiment import lay_out, load
 from ballplate.simulator.inputs import Mapping, read_tree, refused
 from ballplate.simulator.readings import read_readings
+
+from ..machine_files import is_map_file
 
 
 def kind_of_file(path: Path) -> Literal["map", "machine", "experiment"]:

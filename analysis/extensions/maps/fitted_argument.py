@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from ballplate.cli import complain
 
 if TYPE_CHECKING:
-    from ballplate.simulator.maps import FittedMap
+    from ..machine_files import FittedMap
 
 # What is taken.
 FITTED = "map file, as fit -o writes it, or experiment file that names its readings"
@@ -20,8 +20,7 @@ def fitted_map(path: Path) -> FittedMap:
 
     :raises ExperimentError: the file is wrong, or the estimate did not converge.
     """
-    from ballplate.simulator.experiment import read_map
-
+    from ..machine_files import read_map
     from .fit_files import fit_of_file, kind_of_file
 
     if kind_of_file(path) != "experiment":

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from ballplate.simulator.computing import single_threaded
 from ballplate.simulator.machines import Array, Integers
-from ballplate.simulator.maps import FittedMap
 
+from ..machine_files import FittedMap
 from .corrected_points import POINTS_AT_ONCE, corrected, drawn_rows, probe_indices
 from .map_places import MapPlaces
 from .realisations import Draws, Realisations, symmetric_root

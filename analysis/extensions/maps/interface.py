@@ -8,13 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from ballplate.arguments import (
-    PathLike,
-    fit_map_or_path,
-    fitted_map_of,
-    map_or_path,
-    table_of,
-)
+from ballplate.arguments import PathLike, table_of
 from ballplate.simulator.inputs import (
     GivenText,
     ensure_one_of,
@@ -24,12 +18,14 @@ from ballplate.simulator.inputs import (
     hint,
 )
 
+from ..machine_files import fit_map_or_path, fitted_map_of, map_or_path
+
 if TYPE_CHECKING:
     import pandas
     from ballplate.results import Fit
     from ballplate.simulator.machines import Array
-    from ballplate.simulator.maps import FittedMap
 
+    from ..machine_files import FittedMap
     from .correction import Correction
     from .error_curves_result import ErrorCurves
     from .error_map import ErrorMap
@@ -175,8 +171,7 @@ def curves(
     >>> bp.curves(bp.fit(bp.quickstart(), bp.simulate(bp.quickstart())).to_map())
     <ErrorCurves of map: 18 error functions, 3 squareness errors>
     """
-    from ballplate.simulator.experiment import is_map_file
-
+    from ..machine_files import is_map_file
     from .error_curves_result import error_curves, machine_curves
     from .error_sources import map_of_source
 

@@ -16,8 +16,9 @@ from ballplate.results import FEW
 from ballplate.simulator.computing import comparable
 from ballplate.simulator.inputs import listing
 from ballplate.simulator.machines import Array
-from ballplate.simulator.maps import InCommon, readings_in_common, verdict_data, verdict_line
+from ballplate.simulator.maps import verdict_data, verdict_line
 
+from ..machine_files import InCommon, readings_in_common
 from .campaign_tests import TOO_ALIKE, TOO_RARE, JointDifference
 from .compared_maps import ComparedMap, positions_in_common
 from .comparison import MapComparison

@@ -9,8 +9,8 @@ import numpy as np
 from ballplate.simulator.design import Tasks
 from ballplate.simulator.inputs import Target
 from ballplate.simulator.machines import Array
-from ballplate.simulator.maps import FittedMap
 
+from ..machine_files import FittedMap
 from .corrected_points import corrected, drawn_rows, tips
 
 # Lengths whose derivatives are held at once.

@@ -12,8 +12,8 @@ from ballplate.simulator.inputs import (
     listing,
     refused,
 )
-from ballplate.simulator.maps import FittedMap
 
+from ..machine_files import FittedMap
 from .point_files import GivenPoints
 
 

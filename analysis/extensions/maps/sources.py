@@ -6,11 +6,9 @@ from pathlib import Path
 
 import numpy as np
 from ballplate.results import Fit
-from ballplate.simulator.experiment import read_map
 from ballplate.simulator.inputs import LengthFunction
-from ballplate.simulator.maps import FittedMap
 
-from ..machine_files import MachineDescription, load_machine
+from ..machine_files import FittedMap, MachineDescription, load_machine, read_map
 from .compared_maps import ComparedMap, NotComparableError, expected_map, map_of_fit
 from .comparison import compared
 from .fit_files import fit_of_file, kind_of_file

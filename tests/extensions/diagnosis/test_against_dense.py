@@ -20,7 +20,7 @@ from ballplate.simulator.design.observations.distances import CalibratedDistance
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.design.observations.readings import expected_readings
 from ballplate.simulator.design.parameters import shared_layout
-from ballplate.simulator.estimation.gauss_newton import gauss_newton, moved
+from ballplate.simulator.estimation.gauss_newton import iterate, moved
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.geometry.motions import rotation_from_vector
@@ -331,7 +331,7 @@ def test_effects_are_those_of_an_estimate_with_the_bias_put_in(text: str, tmp_pa
         nominal_state(design),
         expected_readings(design, nominal_state(design), design.readings),
     )
-    before = distances_of(design, gauss_newton(design, exact, start).state)
+    before = distances_of(design, iterate(design, exact, start).state)
     given, size, tried = result.patterns, 1e-6, set()
     assert result.deficiency == 0
     chosen = [
@@ -343,7 +343,7 @@ def test_effects_are_those_of_an_estimate_with_the_bias_put_in(text: str, tmp_pa
         if given.kind[k] == "scale" and given.design.artefacts.names[given.subject[k]] != "plate":
             continue
         biased, x = changed(design, given, k, size)
-        found = gauss_newton(biased, x, nominal_state(biased))
+        found = iterate(biased, x, nominal_state(biased))
         assert found.status == "converged"
         for symbol, was, now in zip(
             ("U5", "U6"), before, distances_of(biased, found.state), strict=True

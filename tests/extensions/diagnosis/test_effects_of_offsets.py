@@ -17,7 +17,7 @@ from ballplate.simulator.design.arrays import Design, State, nominal_state
 from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.design.observations.readings import expected_readings
 from ballplate.simulator.estimation.functions import Coordinates, Distances, MeasuredPoints
-from ballplate.simulator.estimation.gauss_newton import gauss_newton
+from ballplate.simulator.estimation.gauss_newton import iterate
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from numpy.typing import NDArray
@@ -64,7 +64,7 @@ def corrected(design: Design, state: State, points: Real, probes: NDArray[np.int
 
 
 def fitted(design: Design, x: Real) -> State:
-    solution = gauss_newton(design, x, nominal_state(design))
+    solution = iterate(design, x, nominal_state(design))
     assert solution.status == "converged"
     return solution.state
 

@@ -17,7 +17,7 @@ from ballplate.extensions.diagnosis.redundancy import reliability_of
 from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.design.observations.readings import expected_readings
-from ballplate.simulator.estimation.gauss_newton import gauss_newton, linearised_fit
+from ballplate.simulator.estimation.gauss_newton import iterate, linearised_fit
 from ballplate.simulator.experiment.layout import lay_out
 from numpy.typing import NDArray
 
@@ -98,12 +98,12 @@ def test_effects_are_those_of_an_estimate_with_the_bias_put_in(tmp_path: Path) -
     design = lay_out(experiment(tmp_path, bar(4), KNOWN))
     result, start = reliability_of(design), nominal_state(design)
     exact = expected_readings(design, start, design.readings)
-    before = distances_of(design, gauss_newton(design, exact, start).state)
+    before = distances_of(design, iterate(design, exact, start).state)
     size = 1e-6
     for k in result.patterns.of_kind("end")[::7]:
         x = exact.copy()
         x[result.patterns.subject[k], result.patterns.axis[k]] += size
-        after = distances_of(design, gauss_newton(design, x, start).state)
+        after = distances_of(design, iterate(design, x, start).state)
         for symbol, was, now in zip(("U5", "U6"), before, after, strict=True):
             largest = np.abs(now - was).max() / size
             np.testing.assert_allclose(
@@ -119,7 +119,7 @@ def test_a_wrong_reading_of_a_shared_ball_is_named(tmp_path: Path) -> None:
     x = x + design.machine.repeatability * np.random.default_rng(3).standard_normal(x.shape)
     wrong = int(np.setdiff1d(np.arange(len(x)), design.plate_readings)[1])
     x[wrong, 0] += 3e-5
-    solution = gauss_newton(design, x, start)
+    solution = iterate(design, x, start)
     search = searched(linearised_fit(design, solution), x, sigma_is_estimated=False)
     assert search is not None
     (found,), ((values, u),) = search.found, search.sizes()

@@ -12,8 +12,8 @@ import numpy as np
 import pandas
 import pytest
 from ballplate.cli import main
+from ballplate.extensions.machine_files.fitted_map import FittedMap
 from ballplate.simulator.inputs.covariances import read_matrix
-from ballplate.simulator.maps.fitted_map import FittedMap
 
 from tests.extensions.maps import wording
 from tests.maps.kinds import FREE, fit_of, write_files

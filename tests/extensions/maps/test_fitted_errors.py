@@ -14,13 +14,13 @@ import pandas as pd
 import pytest
 import yaml
 from ballplate.cli import main
+from ballplate.extensions.machine_files.fitted_map import FittedMap
 from ballplate.extensions.maps.error_functions import error_functions
 from ballplate.extensions.maps.fitted_errors import fitted_lengths
 from ballplate.extensions.maps.map_places import PlacesAsked, map_places
 from ballplate.results.fits import Fit
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.maps.fitted_map import FittedMap
 from ballplate.simulator.readings.simulated import simulated_readings
 from numpy.polynomial.chebyshev import cheb2poly, chebvander
 from numpy.polynomial.legendre import poly2leg

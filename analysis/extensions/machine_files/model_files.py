@@ -10,8 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..inputs.extensions import service
-from ..inputs.yamltree import child, read_bytes, read_tree, to_python
+from ballplate.simulator.inputs import child, read_bytes, read_tree, service, to_python
 
 # Keys of settings of error models that name a file or a folder, by the kind of the model.
 PLACES = {"machine": "file", "python": "folder"}

@@ -9,12 +9,19 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..inputs.messages import ExperimentError, Message
-from ..inputs.problems import Problems, in_order
-from ..inputs.trust import OPENED, Trust
-from ..inputs.yamltree import read_bytes, read_tree
-from ..machines.protocol import Array
-from ..maps.fitted_map import FittedMap
+from ballplate.simulator.inputs import (
+    OPENED,
+    ExperimentError,
+    Message,
+    Problems,
+    Trust,
+    in_order,
+    read_bytes,
+    read_tree,
+)
+from ballplate.simulator.machines import Array
+
+from .fitted_map import FittedMap
 from .map_checks import map_of_tree
 from .map_content import head_of
 

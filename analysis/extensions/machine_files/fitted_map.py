@@ -8,16 +8,11 @@ from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
-
-from ..computing.decompositions import eigh, svd
-from ..computing.rounding import TOUCHED, blank
-from ..design.objects import Probes, Volume
-from ..geometry.motions import AXIS_NAMES
-from ..machines.protocol import Array, ErrorModel, Integers, Parameter, Unit
-from .fit_verdict import LackOfFit
-
-# An estimated sigma below this is rounding: it is about 1e-9 of readings to 0.2 um.
-LEAST_SIGMA = 1e-6
+from ballplate.simulator.computing import TOUCHED, blank, eigh, svd
+from ballplate.simulator.design import Probes, Volume
+from ballplate.simulator.geometry import AXIS_NAMES
+from ballplate.simulator.machines import Array, ErrorModel, Integers, Parameter, Unit
+from ballplate.simulator.maps import LEAST_SIGMA, LackOfFit, MapData
 
 # Eigenvalues of correlations below this, in parts of the largest, are rounding.
 ROUNDING = 1e-13
@@ -40,22 +35,6 @@ class LeftOut:
     unit: Unit
     value: float | None
     standard_uncertainty: float | None
-
-
-@dataclass(frozen=True)
-class MapData:
-    """The readings of a map: their number, and the SHA-256 of their content.
-
-    `positions` are fingerprints of the readings of each position, those of a prior map included.
-    """
-
-    readings: int
-    sha256: str
-    positions: tuple[str, ...] = ()
-
-    def common(self, other_data: MapData) -> frozenset[str]:
-        """Fingerprints of positions whose readings both have."""
-        return frozenset(self.positions) & frozenset(other_data.positions)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

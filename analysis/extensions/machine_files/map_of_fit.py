@@ -6,29 +6,19 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
-from ballplate.simulator.computing.threads import single_threaded
-from ballplate.simulator.design.objects import Probes
-from ballplate.simulator.experiment.model_files import absolute
-from ballplate.simulator.inputs.days import parse_day
-from ballplate.simulator.inputs.extensions import service
-from ballplate.simulator.inputs.settings import listing, number_of
-from ballplate.simulator.inputs.yamltree import to_python, written
-from ballplate.simulator.maps.fit_verdict import LackOfFit
-from ballplate.simulator.maps.fitted_map import (
-    FittedMap,
-    LeftOut,
-    MapData,
-    determined_only,
-)
-from ballplate.simulator.readings.fingerprints import fingerprint, position_fingerprints
-from ballplate.simulator.readings.observed_readings import ObservedReadings
+from ballplate.results import ParameterEstimate
+from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.design import Probes
+from ballplate.simulator.inputs import listing, number_of, parse_day, service, to_python, written
+from ballplate.simulator.maps import LackOfFit
+from ballplate.simulator.readings import ObservedReadings, fingerprint, position_fingerprints
 
-from .estimates import ParameterEstimate
+from .fitted_map import FittedMap, LeftOut, MapData, determined_only
+from .model_files import absolute
 
 if TYPE_CHECKING:
-    from ballplate.simulator.experiment.model import Experiment
-
-    from .estimates import EstimatedFunctions
+    from ballplate.results import EstimatedFunctions
+    from ballplate.simulator.experiment import Experiment
 
 # Coverage factor of experiments that state none.
 COVERAGE_FACTOR = 2.0

@@ -4,16 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
+from ballplate.simulator.experiment import DRAFT, Line, VolumeSettings, tidied
+from ballplate.simulator.geometry import Name
+from ballplate.simulator.inputs import Day, Length, NonEmpty, Settings, Text
+from ballplate.simulator.machines import ErrorModelSettings, Unit
 from pydantic import Field, StringConstraints
-
-from ..geometry.ball_layouts import Name
-from ..inputs.days import Day
-from ..inputs.quantities import Length
-from ..inputs.settings import NonEmpty, Settings, Text
-from ..machines.protocol import Unit
-from ..machines.settings import ErrorModelSettings
-from .json_schema import DRAFT, tidied
-from .sections import Line, VolumeSettings
 
 Sha256 = Annotated[str, StringConstraints(pattern="^[0-9a-f]{64}$")]
 Fingerprint = Annotated[str, StringConstraints(pattern="^[0-9a-f]{16}$")]
@@ -158,7 +153,7 @@ class MapSettings(Settings):
     )
 
 
-def map_schema() -> dict[str, Any]:
+def schema() -> dict[str, Any]:
     """Return the JSON Schema (draft 2020-12) of a map file in YAML."""
     schema: dict[str, Any] = tidied(MapSettings.model_json_schema())
     return {"$schema": DRAFT, **schema, "title": "ballplate map"}

@@ -7,23 +7,23 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from ballplate.presentation.formatting import Data, finite, number, picked
-from ballplate.results.adjustments import freedom_words
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.observations.priors import Priors
-from ballplate.simulator.estimation.gauss_newton import (
+from ballplate.presentation import Data, finite, number, picked
+from ballplate.results import freedom_words
+from ballplate.simulator.design import Design, Priors
+from ballplate.simulator.estimation import (
     Solution,
     as_drawn,
     estimate,
-    gauss_newton,
+    implied_count,
+    iterate,
     linearised_fit,
 )
-from ballplate.simulator.estimation.implied_values import implied_values
-from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.maps.fitted_map import LEAST_SIGMA
-from ballplate.simulator.maps.map_prior import EarlierCampaign
-from ballplate.simulator.readings.observed_readings import ObservedReadings
+from ballplate.simulator.experiment import Experiment
+from ballplate.simulator.machines import Array
+from ballplate.simulator.maps import EarlierCampaign
+from ballplate.simulator.readings import ObservedReadings
+
+from .fitted_map import LEAST_SIGMA
 
 # Level of the two-sided F-test of two sigmas, as Bozivich, Bancroft and Hartley (1956) recommend
 # before variances are pooled: smaller ones miss more differences of a few tenths, and intervals
@@ -187,9 +187,9 @@ def _without_maps(
     is_chosen[: len(experiment.priors)] = [prior.share is None for prior in experiment.priors]
     without = design.observed(priors.select(is_chosen))
     drawn = as_drawn(without)
-    fit = gauss_newton(without, x, solution.state, held_spectrum=drawn)
+    fit = iterate(without, x, solution.state, held_spectrum=drawn)
     freedom = without.observation_count - without.parameter_count + drawn.deficiency
-    freedom -= implied_values(without, fit.state)
+    freedom -= implied_count(without, fit.state)
     if fit.status != "converged" or freedom <= 0:
         return math.nan, 0
     return math.sqrt(fit.factor.sum_of_squares / freedom), freedom

@@ -6,29 +6,34 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-from ..design.objects import Probes, Volume
-from ..inputs.messages import ExperimentError
-from ..inputs.problems import Problems
-from ..inputs.settings import describe, listing, shorten
-from ..inputs.trust import Trust
-from ..inputs.validation import validated
-from ..inputs.yamltree import Mapping as MappingNode
-from ..inputs.yamltree import Node, to_python
-from ..inputs.yamltree import Sequence as SequenceNode
-from ..machines.model_kinds import CustomModelError
-from ..machines.protocol import Array, ErrorModel
-from ..machines.settings import (
+from ballplate.simulator.design import Probes, Volume
+from ballplate.simulator.experiment import check_ends, check_installed
+from ballplate.simulator.inputs import (
+    ExperimentError,
+    Node,
+    Problems,
+    Trust,
+    describe,
+    listing,
+    shorten,
+    to_python,
+    validated,
+)
+from ballplate.simulator.inputs import Mapping as MappingNode
+from ballplate.simulator.inputs import Sequence as SequenceNode
+from ballplate.simulator.machines import (
+    Array,
+    CustomModelError,
+    ErrorModel,
     build_error_model,
     kind_of,
 )
-from ..maps.fit_verdict import LackOfFit
-from ..maps.fitted_map import FittedMap, LeftOut, MapData
+from ballplate.simulator.maps import LackOfFit
+
+from .fitted_map import FittedMap, LeftOut, MapData
 from .map_content import AXES, checksum_of
 from .map_sections import MapSettings
 from .model_files import absolute, fingerprints
-from .own_sections import check_installed
-from .volumes import check_ends
 
 
 # In one piece: what is checked needs what was found right before it.

@@ -9,13 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from ballplate.simulator.inputs import provider, to_list
+from ballplate.simulator.machines import KINDS, Array
+from ballplate.simulator.maps import verdict_content
 
-from ..inputs.extensions import provider
-from ..inputs.yamltree import to_list
-from ..machines.protocol import Array
-from ..machines.settings import KINDS
-from ..maps.fit_verdict import verdict_content
-from ..maps.fitted_map import FittedMap, MapData
+from .fitted_map import FittedMap, MapData
 from .model_files import fingerprints, relative
 
 AXES = ("x", "y", "z")
