@@ -7,9 +7,10 @@ from __future__ import annotations
 
 from ballplate.extensions.diagnosis import remainders
 from ballplate.extensions.estimators import distances as estimators
+from ballplate.extensions.machine_files import curve_files, machine_sections
 from ballplate.extensions.maps import correction
 from ballplate.extensions.maps import volumetric_errors as volumetric
-from ballplate.extensions.planning import criteria, information
+from ballplate.extensions.planning import criteria, information, pool_groups
 from ballplate.extensions.requirements import root_search
 from ballplate.extensions.splines import error_curve, read_points
 from ballplate.extensions.sweeps import axes, bundle, load, sweep_settings
@@ -18,9 +19,6 @@ from ballplate.simulator.design import lookup
 from ballplate.simulator.design.observations import distances, joint_values
 from ballplate.simulator.experiment import (
     checks,
-    curve_files,
-    machine_sections,
-    pool_groups,
     priors,
     references,
     sections,

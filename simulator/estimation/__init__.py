@@ -42,6 +42,6 @@ if TYPE_CHECKING:
     from .implied_values import implied_count
     from .initial import initial_state
     from .linearisation import LinearFunctions, Linearisation, linearise
-    from .spheres import FEWEST_POINTS, FLAT, SphereFit, closest_sphere, fit_sphere
+    from .spheres import FLAT, fit_sphere
 
 __getattr__, __dir__ = lazily(__name__, __file__)

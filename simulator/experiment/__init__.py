@@ -48,7 +48,7 @@ if TYPE_CHECKING:
         named_in,
     )
     from .own_sections import check_installed
-    from .placements import check_turns, in_lengths, resolve_position
+    from .placements import check_turns, resolve_position
     from .pool import placed_only, with_chosen
     from .pool_sections import (
         GroupSettings,

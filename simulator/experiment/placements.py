@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any, Literal
 
 import numpy as np
@@ -19,7 +18,6 @@ from ..geometry.positions import (
     nominal_pose,
 )
 from ..inputs.messages import Steps
-from ..inputs.quantities import length_text
 from ..inputs.room_parts import Place, RoomPart, length_of
 from .bounds import Bounds, edge_of, limits_of, shared
 from .model import Position, ReadingGroup
@@ -71,21 +69,6 @@ def resolve_position(
         return None
     words = settings.description or ""
     return Position(settings.name, artefact, pose, readings, words, settings.enabled, room, lengths)
-
-
-def in_lengths(settings: Mapping[str, Any], position: Position) -> dict[str, Any]:
-    """Return the settings of a position with lengths for the parts of its room."""
-    lengths = {axis: length_text(length) for axis, length in position.parts.items()}
-    stated = dict(settings)
-    for key in {"corner", "centre"} & stated.keys():
-        stated[key] = {axis: lengths.get(axis, text) for axis, text in stated[key].items()}
-    if "level" in stated:
-        stated["level"] = lengths.get(stated["plane"], stated["level"])
-    if "pose" in stated:
-        origin = zip(AXIS_INDEX, stated["pose"]["origin"], strict=False)
-        origin_lengths = [lengths.get(axis, text) for axis, text in origin]
-        stated["pose"] = {**stated["pose"], "origin": origin_lengths}
-    return stated
 
 
 def _readings(

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ballplate.presentation import Data, Result
-from ballplate.simulator.experiment import Candidate, ChangeTimes, Experiment, in_lengths
+from ballplate.simulator.experiment import Candidate, ChangeTimes, Experiment
 from ballplate.simulator.inputs import refused, to_python
 
-from ..planning import RunSheet, sheet_data, sheet_lines, steps_of, summary
+from ..planning import RunSheet, in_lengths, sheet_data, sheet_lines, steps_of, summary
 from .reading_lists import planned_readings, points_csv, points_dmis, template_csv
 from .sheet_page import sheet_page
 

@@ -15,7 +15,6 @@ from typing import TextIO
 import numpy as np
 from ballplate.presentation import Data, Result, picked
 from ballplate.simulator.design import Design
-from ballplate.simulator.estimation import FEWEST_POINTS, SphereFit, closest_sphere
 from ballplate.simulator.experiment import Coordinate
 from ballplate.simulator.inputs import (
     CsvWriter,
@@ -28,6 +27,7 @@ from ballplate.simulator.inputs import (
     shorten,
 )
 
+from .closest_sphere import FEWEST_POINTS, SphereFit, closest_sphere
 from .feature_names import (
     LONGEST_NAME,
     Named,

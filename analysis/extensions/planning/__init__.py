@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from .information import Frames, pool_information
     from .pools import seconds_of
     from .remaining_candidates import Offer, offer
+    from .room_lengths import in_lengths
     from .run_sheet_tables import price, sheet_data, sheet_lines, summary, times
     from .schedule import RunSheet, Step, run_sheet, steps_of
     from .search import Losses, SelectionProblem

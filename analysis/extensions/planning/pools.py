@@ -35,7 +35,6 @@ from ballplate.simulator.experiment import (
     check_lengths,
     edge_of,
     entered,
-    in_lengths,
     is_group,
     limits_of,
     occupied,
@@ -59,6 +58,7 @@ from ballplate.simulator.inputs import (
 )
 
 from .pool_groups import FORBIDDEN, generate
+from .room_lengths import in_lengths
 
 SET_UP, READING, PROBE_CHANGE, PLANE_CHANGE = 20 * 60.0, 15.0, 2 * 60.0, 30 * 60.0
 

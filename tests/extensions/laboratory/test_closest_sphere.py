@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from ballplate.simulator.estimation.spheres import closest_sphere
+from ballplate.extensions.laboratory.closest_sphere import closest_sphere
 from scipy.optimize import least_squares
 
 
