@@ -20,7 +20,7 @@ from ballplate.testing import (
 )
 
 from tests.extensions.influences.test_influence_checks import Long
-from tests.observations.test_python_values import module
+from tests.extensions.own_models.test_python_values import module
 
 
 @pytest.mark.parametrize(

@@ -15,9 +15,9 @@ import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.extensions.certificates.certificate_files import certified_values, read_certificate
+from ballplate.extensions.machine_files import load_machine
 from ballplate.extensions.maps.point_files import read_points as points_to_correct
 from ballplate.extensions.splines.read_points import read_points
-from ballplate.simulator.experiment import load_machine
 from ballplate.simulator.inputs import ExperimentError
 from ballplate.simulator.inputs.tables import read_table
 from ballplate.simulator.readings import read_readings

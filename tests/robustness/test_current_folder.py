@@ -14,7 +14,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.machines.test_custom_model import EXPERIMENT, GOOD
+from tests.extensions.own_models.test_custom_model import EXPERIMENT, GOOD
 from tests.robustness.kit import make_kit
 from tests.robustness.recipes import RECIPES
 

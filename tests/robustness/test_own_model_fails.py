@@ -16,7 +16,7 @@ import ballplate as bp
 import pytest
 from ballplate.cli import main
 
-from tests.machines.test_custom_model import EXPERIMENT, GOOD
+from tests.extensions.own_models.test_custom_model import EXPERIMENT, GOOD
 
 # Checks call the model with seven points; what it does afterwards stands in `wrong`.
 FAILING = (

@@ -15,8 +15,8 @@ from ballplate.cli import main
 from ballplate.extensions.machine_files.fitted_map import FittedMap
 from ballplate.simulator.inputs.covariances import read_matrix
 
+from tests.extensions.machine_files.kinds import FREE, fit_of, write_files
 from tests.extensions.maps import wording
-from tests.maps.kinds import FREE, fit_of, write_files
 from tests.reference import dense
 
 

@@ -26,8 +26,8 @@ from numpy.polynomial.chebyshev import cheb2poly, chebvander
 from numpy.polynomial.legendre import poly2leg
 from numpy.typing import NDArray
 
+from tests.extensions.machine_files import kinds
 from tests.extensions.maps import wording
-from tests.maps import kinds
 from tests.reference import dense
 
 TOP = Path(__file__).parents[3]

@@ -19,7 +19,7 @@ from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Candidate, Experiment, Position
 from ballplate.simulator.experiment.pool import with_chosen
 
-from tests.machines.test_custom_model import GOOD
+from tests.extensions.own_models.test_custom_model import GOOD
 from tests.reference.copies import copy_file
 
 FOLDER = Path("designs/planning")

@@ -23,7 +23,7 @@ from tests.observations import wording
 from tests.observations.test_joint_values import agree, problem, stacked, written
 from tests.reference import dense
 
-TOP = Path(__file__).parents[2]
+TOP = Path(__file__).parents[3]
 SIDES = {"kind": "distances", "pairs": "corner sides", "standard_uncertainty": "0.2 um"}
 ITEM = {
     "kind": "python",

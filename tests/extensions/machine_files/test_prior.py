@@ -10,15 +10,15 @@ import ballplate as bp
 import numpy as np
 import pandas
 import pytest
+from ballplate.extensions.machine_files import sigmas_by_campaign as campaign_sigmas
 from ballplate.extensions.machine_files.fitted_map import FittedMap
 from ballplate.extensions.sweeps.fingerprint import fingerprint
-from ballplate.results import sigmas_by_campaign as campaign_sigmas
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from scipy import stats
 
-from tests.maps import wording
-from tests.maps.kinds import FREE, IN_SPACE, MODELS, model_of, write_files
+from tests.extensions.machine_files import wording
+from tests.extensions.machine_files.kinds import FREE, IN_SPACE, MODELS, model_of, write_files
 from tests.reference.small_quickstart import small_quickstart
 
 CALIBRATION = IN_SPACE["calibration"][0]

@@ -20,7 +20,7 @@ import yaml
 from ballplate.cli import main
 from ballplate.simulator.maps.fit_verdict import LIMIT
 
-from tests.maps import wording
+from tests.extensions.machine_files import wording
 from tests.reference.small_quickstart import SMALL, small_quickstart
 
 # By how much one probe's readings are wrong, in metres, and what that is.

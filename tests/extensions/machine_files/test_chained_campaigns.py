@@ -24,7 +24,7 @@ from ballplate.simulator.readings.observed_readings import ObservedReadings, obs
 from ballplate.simulator.readings.simulated import Simulated, simulated_readings
 from scipy import linalg, stats
 
-from tests.maps.kinds import IN_PLANE
+from tests.extensions.machine_files.kinds import IN_PLANE
 
 # True uncertainties in parts of the stated ones.
 FACTORS = (0.3, 0.55, 1.0, 1.35, 1.8, 3.0)

@@ -12,7 +12,7 @@ import pytest
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.machines.truth import true_machine
 
-from tests.maps.kinds import IN_PLANE
+from tests.extensions.machine_files.kinds import IN_PLANE
 
 POINTS, PAIRS = 40, 60
 # Of a normal distribution within two standard deviations.

@@ -16,7 +16,7 @@ from ballplate.extensions.machine_files.description import (
 from ballplate.extensions.machine_files.machine_file import load_machine
 from numpy.testing import assert_allclose
 
-from tests.maps.kinds import IN_SPACE
+from tests.extensions.machine_files.kinds import IN_SPACE
 
 POSITIONS = np.linspace(-100.0, 500.0, 25)
 VALUES = 2.0 * np.sin(POSITIONS / 90.0) + 1e-3 * POSITIONS

@@ -9,7 +9,7 @@ from typing import Any
 
 import ballplate as bp
 
-from tests.machines.test_custom_model import GOOD
+from tests.extensions.own_models.test_custom_model import GOOD
 
 PROBES = {"down": ["0 mm", "0 mm", "-50 mm"], "right": ["50 mm", "0 mm", "0 mm"]}
 POSITIONS: list[dict[str, Any]] = [

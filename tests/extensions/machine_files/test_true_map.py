@@ -8,7 +8,7 @@ import ballplate as bp
 import numpy as np
 import pytest
 
-from tests.maps.kinds import MODELS, experiment_of, fit_of, write_files
+from tests.extensions.machine_files.kinds import MODELS, experiment_of, fit_of, write_files
 
 
 @pytest.fixture(scope="module")

@@ -12,8 +12,8 @@ import pytest
 from ballplate.cli import main
 from ballplate.extensions.machine_files.fitted_map import FittedMap
 
-from tests.maps import wording
-from tests.maps.kinds import experiment_of, fit_of, module_of, write_files
+from tests.extensions.machine_files import wording
+from tests.extensions.machine_files.kinds import experiment_of, fit_of, module_of, write_files
 
 
 @pytest.fixture(scope="module")

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from ballplate.extensions.own_models import custom
 from ballplate.results.checked_designs import check
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.machines import custom
 
 from tests.machines import wording
 
