@@ -391,8 +391,8 @@ def test_an_extension_of_a_laboratory_is_found(
             "fit (functions) is provided by ballplate",
         ),
         (
-            'Extension("mine", "mine", schemas={"map": "a"})',
-            "map (schemas) is provided by ballplate",
+            'Extension("mine", "mine", schemas={"experiment": "a"})',
+            "experiment (schemas) is provided by ballplate",
         ),
         ('Extension("mine", "mine", commands=["a"])', "its commands are no mapping"),
         ('Extension("mine", "mine", commands={"a": "b"})', "a (commands) is 'b', and no Command"),

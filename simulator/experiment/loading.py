@@ -254,13 +254,14 @@ def _build(
         return None, problems.messages
     if evaluation is None:
         evaluation = Evaluation(np.zeros((0, machine.dimension)), "")
+    error_model = sections.get("error_model")
     experiment = Experiment(
         title=sections.get("title"),
         description=sections.get("description") or "",
         name=name,
         source=source,
         machine=machine,
-        error_model=with_defaults(sections.get("error_model"), machine.dimension),
+        error_model=error_model and with_defaults(error_model, machine.dimension),
         true_machine=with_model_defaults(sections.get("true_machine"), machine.dimension),
         probes=probes,
         artefacts=references.artefacts,

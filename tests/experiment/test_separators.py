@@ -229,7 +229,7 @@ READERS = {
     "simulator/experiment/probes.py",  # star
     "simulator/experiment/machine.py",  # points
     "simulator/experiment/references.py",  # balls
-    "simulator/experiment/curve_files.py",  # exx, eyx
+    "analysis/extensions/machine_files/curve_files.py",  # exx, eyx
     "simulator/inputs/covariances.py",
     "simulator/readings/reading_sources.py",
     "analysis/extensions/certificates/certificate_files.py",

@@ -12,7 +12,7 @@ from ballplate.simulator.computing import evenly_spread, single_threaded
 from ballplate.simulator.design import Design, State, shared_layout
 from ballplate.simulator.estimation import holding, linearise, moved, newton_step
 from ballplate.simulator.experiment import Experiment, lay_out, placed_only
-from ballplate.simulator.inputs import ExperimentError, UnusableError, yaml_text
+from ballplate.simulator.inputs import ExperimentError, MissingExtensionError, yaml_text
 from ballplate.simulator.machines import Array, ErrorModel
 from ballplate.simulator.readings import joined, simulated_readings
 from ballplate.uncertainty import Quantity, evaluation_points, uncertainties
@@ -183,7 +183,7 @@ def assumption_effects(experiment: Experiment, lengths: Quantity) -> Assumptions
             effects.append(_effect(experiment, assumption, lengths, together, quantity))
         except ExperimentError as error:
             left_out.append((assumption.name, error.messages[0].text_with_path))
-        except UnusableError as error:
+        except MissingExtensionError as error:
             left_out.append((assumption.name, str(error)))
     # Undetermined distances cost more than any uncertainty.
     effects.sort(key=lambda effect: (effect.undetermined, effect.ratio), reverse=True)
@@ -208,7 +208,7 @@ def _together(
             entries[key] = [*entries[key], *value[stated:]] if key in entries else value
     try:
         return _with_choice(experiment, experiment.with_(entries))
-    except (ExperimentError, UnusableError):
+    except (ExperimentError, MissingExtensionError):
         return None
 
 

@@ -9,9 +9,9 @@ from ballplate.arguments import PathLike
 from ballplate.results import Fit
 from ballplate.simulator.inputs import ensure_path, ensure_type
 
-from . import map_files
 from .fitted_map import FittedMap
 from .map_files import read_map
+from .map_files import write_map as write
 
 
 def load_map(path: PathLike) -> FittedMap:
@@ -43,7 +43,7 @@ def write_map(fitted: FittedMap, path: PathLike) -> None:
     """
     ensure_type(FittedMap, "what to_map() of a fit gives", fitted=fitted)
     ensure_path("path", path)
-    map_files.write_map(fitted, path)
+    write(fitted, path)
 
 
 def fit_map_or_path(name: str, fitted: Fit | FittedMap | PathLike) -> Fit | FittedMap | Path:

@@ -51,7 +51,8 @@ def test_machines_are_drawn_within_the_covariance(folder: Path) -> None:
             folder,
             true_machine={"kind": "map", "file": "drawn.yaml", "draw": seed},
         )
-        drawn.append(experiment.true_machine.machine().a)
+        corners = experiment.machine.volume.corners
+        drawn.append(experiment.true_machine.true_machine(fitted.model, *corners).a)
     apart = np.linalg.solve(np.linalg.cholesky(fitted.covariance), (drawn - fitted.values).T)
     # Each is chi-squared of 50 with a standard deviation of 10, each mean normal with 1/7.
     assert (np.abs((apart**2).sum(axis=1) - 50.0) < 5 * 10.0).all()
