@@ -38,7 +38,6 @@ BUILDS_ON = {
     ("campaign", "machine_files"): "the next position knows of earlier campaigns' maps",
     ("certificates", "machine_files"): "a certificate names its readings as a map does",
     ("judgement", "machine_files"): "each position is left out with the sigmas of prior maps",
-    ("sweeps", "own_models"): "a case is another one where the user's own code differs",
     ("campaign", "planning"): "run sheets are of the steps of a plan, and plans begun are read",
     ("requirements", "planning"): "the hours that meet a target are those of plans",
     ("repair", "planning"): "what repairs a design is chosen as positions of a plan are",
@@ -199,6 +198,15 @@ assert all(any(f"extension {name}" in text for name in hidden) for text in unsea
 assert fit.converged and "<table" in fit._repr_html_() and "<table" in bp.check(quickstart)._repr_html_()
 with contextlib.suppress(SystemExit):
     main(["--help"])
+assert main(["schema"]) == 0
+with open(quickstart, encoding="utf-8") as file:
+    text = file.read().replace("position_coefficients", "position_coeficients")
+with open(sys.argv[2], "w", encoding="utf-8") as file:
+    file.write(text)
+told = io.StringIO()
+with contextlib.redirect_stderr(told):
+    assert main(["check", sys.argv[2]]) == 3
+assert "position_coeficients: unknown key" in told.getvalue(), told.getvalue()
 told = io.StringIO()
 with contextlib.redirect_stderr(told):
     status = main(["run", quickstart, "--report", sys.argv[1] + ".html"])

@@ -142,6 +142,9 @@ def _refuse_misused(options: Namespace) -> None:
         raise UsageError(f"--{option} applies to --estimator {estimators} only; leave it out")
     if options.output and options.estimator != "full":
         raise UsageError("-o writes the map of the full estimator; leave it out")
+    if options.output:
+        # Refused before the estimate where its extension is missing.
+        service("write_map")
     if options.date and not options.output:
         raise UsageError("--date applies to -o only; leave it out")
     if options.plot and options.estimator not in DRAWN:

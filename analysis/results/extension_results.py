@@ -4,9 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 from ballplate.presentation.formatting import Data
+
+if TYPE_CHECKING:
+    from ballplate.simulator.estimation.gauss_newton import Solution
+    from ballplate.simulator.maps.map_prior import EarlierCampaign
+    from ballplate.simulator.readings.observed_readings import ObservedReadings
 
 
 class AskedResult(Protocol):
@@ -37,3 +42,23 @@ class IssuedCertificate(AskedResult, Protocol):
     def datum(self) -> str: ...
 
     def texts(self, path: str | Path) -> Mapping[Path, str]: ...
+
+
+class SeparateSigmas(AskedResult, Protocol):
+    """The estimate with prior maps, `observed` as weighted in it, and the `sum_of_squares` and
+    `freedom` of sigma; `degrees_of_freedom` are the fewest of all sigmas in uncertainties,
+    `ratios` those of the maps' sigmas to that of readings.
+    """
+
+    @property
+    def observed(self) -> ObservedReadings: ...
+    @property
+    def solution(self) -> Solution: ...
+    @property
+    def sum_of_squares(self) -> float: ...
+    @property
+    def freedom(self) -> int: ...
+    @property
+    def degrees_of_freedom(self) -> int: ...
+    @property
+    def ratios(self) -> Mapping[EarlierCampaign, float]: ...

@@ -28,6 +28,7 @@ from ballplate.results.estimates import (
 )
 from ballplate.results.extension_results import (
     IssuedCertificate,
+    SeparateSigmas,
 )
 from ballplate.results.plates import PlateCoordinates
 from ballplate.results.prediction import by_label, length_headline, rank_words
@@ -104,7 +105,7 @@ class Fit(FitResult):
     untested: str = ""
     estimated: EstimatedFunctions | None = None
     experiment: Experiment | None = None
-    campaigns: Any | None = None
+    campaigns: SeparateSigmas | None = None
 
     @property
     def design(self) -> Design:

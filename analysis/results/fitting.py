@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from ballplate.simulator.computing.threads import single_threaded
@@ -22,6 +22,7 @@ from .adjustments import Adjustment, adjusted
 from .checked_designs import check
 from .diagnosis import diagnosed
 from .estimates import estimated_functions, parameter_estimates
+from .extension_results import SeparateSigmas
 from .fits import Fit
 from .plates import plate_coordinates
 from .residuals import largest_residuals
@@ -41,7 +42,7 @@ def fit(
     t, t^2, ... on [0, 1] instead of those of the stable basis.
     """
     is_estimated = (sigma or experiment.sigma) == "estimated"
-    campaigns = None
+    campaigns: SeparateSigmas | None = None
     if is_estimated and experiment.earlier_campaigns:
         campaigns = service("campaign_sigmas")(experiment, observed)
     observed = observed if campaigns is None else campaigns.observed
@@ -80,7 +81,9 @@ def fit(
     )
 
 
-def _sigma(at: Linearisation, campaigns: Any | None, is_estimated: bool) -> tuple[float, bool, int]:
+def _sigma(
+    at: Linearisation, campaigns: SeparateSigmas | None, is_estimated: bool
+) -> tuple[float, bool, int]:
     """Return sigma, whether it is estimated, and the degrees of freedom of uncertainties."""
     squares, freedom = at.factor.sum_of_squares, at.degrees_of_freedom
     if campaigns is not None:

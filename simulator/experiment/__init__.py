@@ -79,6 +79,6 @@ if TYPE_CHECKING:
         place_of,
         variant_trees,
     )
-    from .volumes import check_ends, check_within
+    from .volumes import check_ends
 
 __getattr__, __dir__ = lazily(__name__, __file__)

@@ -372,7 +372,7 @@ def check_size(
         )
         problems.add(("evaluation", "points"), text)
     check_lengths(
-        {("calibration", i): position for i, position in calibrations.items()},
+        {("calibration", i): calibration for i, calibration in calibrations.items()},
         positions.values(),
         references,
     )

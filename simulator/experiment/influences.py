@@ -62,9 +62,9 @@ def with_influences(design: Design, experiment: Experiment, is_pool: bool = Fals
         return design
     parts = design.parts(experiment.source.parent)
     influences = []
-    for i, parameter in enumerate(experiment.influences):
+    for i, settings in enumerate(experiment.influences):
         try:
-            influences.append(parameter.influence(parts))
+            influences.append(settings.influence(parts))
         except ValueError as error:
             raise experiment.refused(("influences", i), str(error)) from None
         text = wrong_of_parameters(influences[-1].parameters, len(design.positions.names))

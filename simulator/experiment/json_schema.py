@@ -4,22 +4,25 @@ written.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Any
 
 from pydantic import create_model
 
-from ..inputs.extensions import names, provided
+from ..inputs.extensions import MissingExtensionError, names, provided
 from .sections import ExperimentSettings
 
 DRAFT = "https://json-schema.org/draft/2020-12/schema"
 
 
 def schema() -> dict[str, Any]:
-    """Return the JSON Schema (draft 2020-12) of an experiment file."""
-    keys: dict[str, Any] = {
-        key: (provided("sections", key, "SETTINGS"), None)
-        for key in names("sections", with_registered=True)
-    }
+    """Return the JSON Schema (draft 2020-12) of an experiment file, without what extensions provide
+    that are not installed.
+    """
+    keys: dict[str, Any] = {}
+    for key in names("sections", with_registered=True):
+        with suppress(MissingExtensionError):
+            keys[key] = (provided("sections", key, "SETTINGS"), None)
     settings = ExperimentSettings
     if keys:
         about = ExperimentSettings.__doc__

@@ -117,7 +117,9 @@ def standard_lengths(
             rows += between(number, [(kind, first_ball[name] + np.array([0, 1]))])
         elif isinstance(settings, BryanGaugeSettings):
             calibrations = [
-                artefact for artefact in experiment.calibration if artefact.artefact == name
+                calibration
+                for calibration in experiment.calibration
+                if calibration.artefact == name
             ]
             kind = (
                 unknown(name, "radius", settings.radius)

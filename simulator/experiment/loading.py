@@ -35,6 +35,7 @@ from .checks import (
 from .influences import resolve_influences
 from .machine import resolve_evaluation, resolve_machine, resolve_noise, target_of
 from .model import Evaluation, Experiment, Position
+from .needed_services import needed_service
 from .own_sections import needed_extensions, resolve_own_sections
 from .placements import resolve_position
 from .pool import enabled_only, placed_only
@@ -214,9 +215,10 @@ def _build(
             if volume is not None and len(volume.lower) == references.dimension:
                 check_inside(position, ("positions", i), volume, probes, references)
     candidates = None
-    if written(root, "pool") is not None:
-        candidates = service("resolve_candidates")(sections, positions, bounds, references)
-    is_complete = candidates is None or candidates.complete
+    has_pool = written(root, "pool") is not None
+    if has_pool and (choose := needed_service("resolve_candidates", ("pool",), problems)):
+        candidates = choose(sections, positions, bounds, references)
+    is_complete = not has_pool if candidates is None else candidates.complete
     choices: tuple[Position, ...] = () if candidates is None else candidates.positions
     possible = choices if is_complete else None
     check_use(sections, positions, position_count, references, possible, planning)

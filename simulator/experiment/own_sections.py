@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..design.lookup import References
-from ..inputs.extensions import is_installed, module_with, owner, registered
+from ..inputs.extensions import is_installed, module_with, owner, registered, shipped
 from ..inputs.problems import Problems
 from .structure import KEYS, Sections
 
@@ -34,9 +34,10 @@ def check_installed(names: Any, problems: Problems) -> None:
 
 
 def needed_extensions(sections: Sections) -> tuple[str, ...]:
-    """Names of the extensions that a file states, or has kinds or keys of."""
+    """Names of the extensions that a file states, or has kinds or keys of and are not shipped."""
     classes = {type(part) for value in sections.values.values() for part in _parts(value)}
     used = {name for settings_class in classes if (name := owner(settings_class)) is not None}
+    used -= {extension.name for extension in shipped()}
     return tuple(dict.fromkeys((*(sections.get("extensions") or ()), *sorted(used))))
 
 

@@ -50,8 +50,8 @@ def placed_only(experiment: Experiment) -> Experiment:
     names = {position.name for position in experiment.positions}
     return replace(
         experiment,
-        artefacts={name: prior for name, prior in experiment.artefacts.items() if name in placed},
-        layouts={name: prior for name, prior in experiment.layouts.items() if name in placed},
+        artefacts={name: each for name, each in experiment.artefacts.items() if name in placed},
+        layouts={name: layout for name, layout in experiment.layouts.items() if name in placed},
         calibration=tuple(
             calibration
             for calibration in experiment.calibration

@@ -10,7 +10,6 @@ from ..design.lookup import References
 from ..design.objects import Machine
 from ..geometry.artefacts import BryanGaugeSettings
 from ..geometry.motions import AXIS_NAMES, pose_parameter_names
-from ..inputs.extensions import service
 from ..inputs.messages import Steps, format_path
 from ..inputs.number_arrays import Array
 from ..inputs.quantities import PARSERS, QuantityError
@@ -20,6 +19,7 @@ from ..machines.model_kinds import CustomModelError
 from ..machines.protocol import ErrorModel, Unit
 from ..machines.settings import build_error_model, kind_of
 from .model import Position, Prior, Probe
+from .needed_services import needed_service
 from .sections import MapPriorSettings, PriorSettings
 from .structure import Sections
 
@@ -45,12 +45,12 @@ def resolve_priors(
         # Told already, with the error model.
         return ()
     known_quantities = _known(model, positions, references)
-    priors = []
+    priors: list[Prior] = []
     for i, entry in entries.items():
         steps = ("priors", int(i))
         if isinstance(entry, MapPriorSettings):
-            read = service("resolve_map_prior")
-            priors += read(entry, steps, model, machine, references, probes)
+            read = needed_service("resolve_map_prior", steps, references.problems)
+            priors += read(entry, steps, model, machine, references, probes) if read else []
         else:
             priors += _prior(entry, steps, known_quantities, references)
         if len(priors) > MOST_PRIORS:
@@ -122,7 +122,7 @@ def _prior(
         problems.add((*steps, "parameter"), f'unknown parameter "{shorten(name)}"; {advice}')
         return []
     mark, place = mark_of(problems.root, (*steps, "parameter")), format_path((*steps, "parameter"))
-    priors = []
+    priors: list[Prior] = []
     for full, position, probe, component, row, unit, nominal in known_quantities[name]:
         parse, values = PARSERS[unit], []
         for key, text in (

@@ -5,11 +5,11 @@ from __future__ import annotations
 import codecs
 
 from ..design.lookup import References
-from ..inputs.extensions import service
 from ..inputs.messages import ExperimentError, Steps
 from ..inputs.quantities import LENGTH_UNITS, QuantityError, parse_positive_length, plain_unit
 from ..inputs.settings import hint
 from .name_rules import check_rule
+from .needed_services import needed_service
 from .readings_section import ColumnsSettings, CompensationSettings, ReadingsSettings
 from .structure import Sections
 
@@ -98,7 +98,9 @@ def _read_correction(settings: ReadingsSettings, references: References) -> None
         text = "a machine file has 3 dimensions, but machine.volume has 2"
         references.problems.add(steps, text)
         return
-    read = service("machine_of_file")
+    read = needed_service("machine_of_file", steps, references.problems)
+    if read is None:
+        return
     try:
         correction.set_machine(read(references.file(correction.file), references.trust))
     except ExperimentError as error:

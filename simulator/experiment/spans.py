@@ -34,9 +34,9 @@ def unspanned(tree: Node, changed: Experiment) -> str:
     if before.dimension != changed.dimension:
         return ""
     volume, plates = changed.machine.volume, _plates(changed)
-    places = {at.name: at for at in before.positions}
-    room = _least(changed, [np.abs(at.room) for at in plates])
-    followed = _least(changed, [_followed(at, places.get(at.name)) for at in plates])
+    places = {place.name: place for place in before.positions}
+    room = _least(changed, [np.abs(place.room) for place in plates])
+    followed = _least(changed, [_followed(place, places.get(place.name)) for place in plates])
     is_lost = room > followed + SLIGHTLY * volume.size
     ends = 1e3 * np.array([volume.lower + room[0], volume.upper - room[1], volume.size])
     spans = [
@@ -55,7 +55,7 @@ def unspanned(tree: Node, changed: Experiment) -> str:
 
 def _plates(experiment: Experiment) -> list[Position]:
     artefacts = experiment.artefacts
-    return [at for at in experiment.positions if artefacts[at.artefact].role == "plate"]
+    return [place for place in experiment.positions if artefacts[place.artefact].role == "plate"]
 
 
 def _least(experiment: Experiment, rooms: Sequence[Array]) -> Array:

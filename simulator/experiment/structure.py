@@ -12,7 +12,7 @@ from pydantic import TypeAdapter, ValidationError
 from ..design.influences.kinds import AnyInfluence
 from ..design.observations.kinds import CalibrationSettings
 from ..geometry.artefacts import AnyArtefactSettings
-from ..inputs.extensions import names, provided
+from ..inputs.extensions import MissingExtensionError, names, provided
 from ..inputs.messages import Steps
 from ..inputs.problems import Problems
 from ..inputs.settings import Settings, describe, hint, nearest
@@ -202,6 +202,8 @@ def _validate(
         return {steps: adapter.validate_python(to_python(node))}
     except ValidationError as error:
         explain_in(problems, error, adapter, node, steps)
+    except MissingExtensionError as error:
+        problems.add(steps, str(error))
     return {}
 
 

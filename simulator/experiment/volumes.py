@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
-from ..design.lookup import References
-from ..design.objects import Machine
 from ..inputs.messages import Steps
 from ..inputs.problems import Problems
 from ..inputs.quantities import format_length
-from ..machines.arrangement import AXES
-
-# Ends that are the same, in metres.
-TOLERANCE = 1e-9
 
 
 def check_ends(ends: Mapping[str, tuple[float, float]], steps: Steps, problems: Problems) -> bool:
@@ -22,30 +16,3 @@ def check_ends(ends: Mapping[str, tuple[float, float]], steps: Steps, problems: 
         text = f"ends at {format_length(high)}, not above its beginning, {format_length(low)}"
         problems.add((*steps, axis), f"{text}; exchange or correct them")
     return not wrong
-
-
-def check_within(
-    lower: Sequence[float],
-    upper: Sequence[float],
-    machine: Machine,
-    steps: Steps,
-    references: References,
-    remedy: str = "stay within it",
-    is_same: bool = False,
-) -> bool:
-    """True if the volume of a machine is within ends (d,), or the same if asked; others are
-    reported.
-    """
-    outer = [*zip(lower, upper, strict=True)]
-    inner = [*zip(machine.volume.lower.tolist(), machine.volume.upper.tolist(), strict=True)]
-    is_right = True
-    for axis, ends, (low, high) in zip(AXES, outer, inner, strict=False):
-        beyond = ends[0] - low, high - ends[1]
-        if max(map(abs, beyond) if is_same else beyond) > TOLERANCE:
-            text = (
-                f"its volume is {format_length(ends[0])} to {format_length(ends[1])} in {axis},"
-                f" but machine.volume is {format_length(low)} to {format_length(high)}; {remedy}"
-            )
-            references.problems.add(steps, text)
-            is_right = False
-    return is_right

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     )
     from .days import Day, parse_day, stated_day
     from .decoding import LINE_END, decoded, refuse_controls, text_and_encoding
-    from .extensions import MissingExtensionError, optional_service, provider, service
+    from .extensions import MissingExtensionError, optional_service, provider, service, shipped
     from .faces import lazily as lazily
     from .messages import (
         MORE_ERRORS,

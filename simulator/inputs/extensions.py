@@ -28,7 +28,12 @@ if TYPE_CHECKING:
 
 ENTRY_POINT = "ballplate.extensions"
 OF_FILES = (
-    *("artefacts", "calibrations", "error_models", "true_machines", "influences", "sections"),
+    "artefacts",
+    "calibrations",
+    "error_models",
+    "true_machines",
+    "influences",
+    "sections",
 )
 KINDS = ("commands", "functions", "services", "schemas", *OF_FILES, "quantities")
 
@@ -71,8 +76,9 @@ class Command:
 class Extension:
     """Names that a `package` provides, each with its module below the package.
 
-    `functions` are those of `import ballplate`, `services` those that the kernel uses, and
-    `schemas` types of files whose module has a function `schema`.
+    `functions` are those of `import ballplate`, `services` those that the kernel uses, or another
+    extension that can do without, and `schemas` types of files whose module has a function
+    `schema`.
 
     `artefacts`, `calibrations`, `error_models`, `true_machines` and `influences` are values of
     `kind` in a file, and `sections` further keys of an experiment; their modules have SETTINGS, the

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, get_args
 
 from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationError
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from .extensions import names, provided, provider
+from .extensions import MissingExtensionError, names, provided, provider
 from .settings import Settings
 from .unusable import UnusableError
 
@@ -49,15 +50,14 @@ class OpenKinds:
     ) -> CoreSchema:
         # The kernel's kinds, if any, are discriminated here, since a field would do so only
         # afterwards.
-        of_kernel = (
-            core_schema.tagged_union_schema({}, self.discriminator)
-            if source is self.base
-            else handler.generate_schema(Annotated[source, Field(discriminator="kind")])
-        )
+        if source is not self.base:
+            of_kernel = handler.generate_schema(Annotated[source, Field(discriminator="kind")])
+            return core_schema.no_info_wrap_validator_function(self._validated, of_kernel)
         # An empty union has nothing to write.
-        anything = core_schema.simple_ser_schema("any")
         return core_schema.no_info_wrap_validator_function(
-            self._validated, of_kernel, serialization=anything
+            self._validated,
+            core_schema.tagged_union_schema({}, self.discriminator),
+            serialization=core_schema.simple_ser_schema("any"),
         )
 
     def _validated(self, value: Any, of_kernel: Callable[[Any], Any]) -> Any:
@@ -76,9 +76,10 @@ class OpenKinds:
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
         union_schema = handler(schema)
-        additions: list[Any] = [
-            self.settings(kind) for kind in names(self.provided, with_registered=True)
-        ]
+        additions: list[Any] = []
+        for kind in names(self.provided, with_registered=True):
+            with suppress(MissingExtensionError):
+                additions.append(self.settings(kind))
         for settings in additions:
             settings.model_rebuild()
         if additions:

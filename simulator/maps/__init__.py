@@ -1,4 +1,4 @@
-"""Fitted maps of machines: estimated errors with their covariance, and what follows from them."""
+"""The verdict of a fit that its map keeps, and what is kept of the campaign of an earlier map."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""Prior information of a fitted map on its machine in another campaign, and the sigma of its
-own.
-"""
+"""What an experiment keeps of the campaign of an earlier map: its readings, and its sigma."""
 
 from __future__ import annotations
 

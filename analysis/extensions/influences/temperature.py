@@ -298,10 +298,9 @@ class TemperaturesSettings(InfluenceSettings):
         listed = [
             getattr((self.positions or {}).get(name), key, None) for name in design.positions.names
         ]
-        chosen = [otherwise if position is None else position for position in listed]
+        chosen = [otherwise if value is None else value for value in listed]
         return np.array(
-            [position[axis] if isinstance(position, tuple) else position for position in chosen],
-            float,
+            [value[axis] if isinstance(value, tuple) else value for value in chosen], float
         )
 
 

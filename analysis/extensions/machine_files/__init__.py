@@ -1,5 +1,5 @@
-"""Machines from files: described errors, measured curves and maps, as true machines, and what a map
-tells of the machine beforehand.
+"""Machines from files: described errors, measured curves, and maps of fits, which are written and
+loaded here; as true machines, error models, corrections of a controller and prior knowledge.
 """
 
 from __future__ import annotations

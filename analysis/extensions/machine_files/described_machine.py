@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Literal
 
 from ballplate.simulator.design import Machine, References
-from ballplate.simulator.experiment import check_within
 from ballplate.simulator.inputs import ExperimentError, Length, format_length, listing
 from ballplate.simulator.machines import (
     Corner,
@@ -19,6 +18,7 @@ from pydantic import Field, PrivateAttr
 from .description import MachineDescription, random_part, true_volumetric
 from .framing import in_frame_of
 from .machine_file import load_machine
+from .volume_ends import check_within
 
 
 class TrueMachineFileSettings(FurtherTrueMachine):

@@ -28,9 +28,9 @@ from ballplate.simulator.machines import (
     build_error_model,
     kind_of,
 )
-from ballplate.simulator.maps import LackOfFit
+from ballplate.simulator.maps import LackOfFit, MapData
 
-from .fitted_map import FittedMap, LeftOut, MapData
+from .fitted_map import FittedMap, LeftOut
 from .map_content import AXES, checksum_of
 from .map_sections import MapSettings
 from .model_files import absolute, fingerprints

@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.inputs import provider, to_list
+from ballplate.simulator.inputs import provider, shipped, to_list
 from ballplate.simulator.machines import KINDS, Array
-from ballplate.simulator.maps import verdict_content
+from ballplate.simulator.maps import MapData, verdict_content
 
-from .fitted_map import FittedMap, MapData
+from .fitted_map import FittedMap
 from .model_files import fingerprints, relative
 
 AXES = ("x", "y", "z")
@@ -66,9 +66,9 @@ def head_of(fitted: FittedMap, folder: Path) -> dict[str, Any]:
 
 
 def _needed(kind: str) -> list[str]:
-    """Return the extension that has a kind of error model, unless the kernel has it."""
+    """Return the extension that has a kind of error model, unless it is shipped."""
     extension = None if kind in KINDS else provider("error_models", kind)
-    return [] if extension is None else [extension.name]
+    return [] if extension is None or extension in shipped() else [extension.name]
 
 
 def _data(map_data: MapData) -> dict[str, Any]:

@@ -10,10 +10,10 @@ from ballplate.results import ParameterEstimate
 from ballplate.simulator.computing import single_threaded
 from ballplate.simulator.design import Probes
 from ballplate.simulator.inputs import listing, number_of, parse_day, service, to_python, written
-from ballplate.simulator.maps import LackOfFit
+from ballplate.simulator.maps import LackOfFit, MapData
 from ballplate.simulator.readings import ObservedReadings, fingerprint, position_fingerprints
 
-from .fitted_map import FittedMap, LeftOut, MapData, determined_only
+from .fitted_map import FittedMap, LeftOut, determined_only
 from .model_files import absolute
 
 if TYPE_CHECKING:

@@ -7,7 +7,7 @@ from datetime import date
 
 import numpy as np
 from ballplate.simulator.design import Machine, References, Volume
-from ballplate.simulator.experiment import MapPriorSettings, Prior, Probe, check_within
+from ballplate.simulator.experiment import MapPriorSettings, Prior, Probe
 from ballplate.simulator.geometry import even_grid
 from ballplate.simulator.inputs import (
     ExperimentError,
@@ -23,6 +23,7 @@ from ballplate.simulator.maps import MapShare
 from .fitted_map import FittedMap
 from .map_combinations import campaign_of, determined_combinations, marginal_of
 from .map_files import read_map
+from .volume_ends import check_within
 
 YEAR = 365.25
 # The same corrections, in metres, and in parts of them.

@@ -7,13 +7,13 @@ from typing import Annotated, Literal
 
 import numpy as np
 from ballplate.simulator.design import Machine, References
-from ballplate.simulator.experiment import check_within
 from ballplate.simulator.inputs import read_bytes
 from ballplate.simulator.machines import Corner, ErrorModel, FurtherTrueMachine, TrueMachine
 from pydantic import Field, PrivateAttr
 
 from .framing import in_frame_of
 from .map_priors import read_named
+from .volume_ends import check_within
 
 
 class TrueMapSettings(FurtherTrueMachine):

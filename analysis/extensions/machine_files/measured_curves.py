@@ -9,6 +9,7 @@ from ballplate.simulator.design import Machine, References
 from ballplate.simulator.inputs import ExperimentError, NonEmpty, format_length, listing
 from ballplate.simulator.machines import (
     ARRANGEMENT,
+    AXES,
     AXIS_ERRORS,
     PRODUCTS,
     ArrangementName,
@@ -23,8 +24,6 @@ from pydantic import Field, PrivateAttr
 
 from .curve_files import read_numbered_curves
 from .curves import Interpolation, Points, curves_model
-
-AXES = ("x", "y", "z")
 
 
 class CurvesSettings(FurtherTrueMachine):

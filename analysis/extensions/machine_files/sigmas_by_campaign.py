@@ -20,10 +20,8 @@ from ballplate.simulator.estimation import (
 )
 from ballplate.simulator.experiment import Experiment
 from ballplate.simulator.machines import Array
-from ballplate.simulator.maps import EarlierCampaign
+from ballplate.simulator.maps import LEAST_SIGMA, EarlierCampaign
 from ballplate.simulator.readings import ObservedReadings
-
-from .fitted_map import LEAST_SIGMA
 
 # Level of the two-sided F-test of two sigmas, as Bozivich, Bancroft and Hartley (1956) recommend
 # before variances are pooled: smaller ones miss more differences of a few tenths, and intervals

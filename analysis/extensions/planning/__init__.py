@@ -1,4 +1,4 @@
-"""Planning: positions chosen from a pool, their order, the design as a file, and its repair."""
+"""Planning: positions chosen from a pool, their order, and the design as a file."""
 
 from __future__ import annotations
 

@@ -159,7 +159,7 @@ def _campaign(
     # Drift depends on the order of readings, which follows from the choice.
     steady = replace(
         experiment,
-        influences=tuple(some for some in experiment.influences if not some.in_order),
+        influences=tuple(kind for kind in experiment.influences if not kind.in_order),
     )
 
     information = pool_information(
@@ -203,14 +203,14 @@ def _campaign(
     _refuse_unusable(experiment, chosen, limits)
     unlimited = replace(problem, constraints=free)
     done_indices = tuple(candidates[k] for k in offered.done)
-    interrupted = tuple(candidates[given_candidate.part] for given_candidate in offered.interrupted)
+    interrupted = tuple(candidates[begun.part] for begun in offered.interrupted)
     # In the order in which they will be read, as the first of a plate may hold its frame, on which
     # U1 and U2 depend.
     sheet = run_sheet(chosen, pool.changes, done_indices, completed, interrupted)
     names = short_names(
         (step.position for step in sheet.steps),
         offered.names,
-        [given_candidate.name for given_candidate in candidates],
+        [candidate.name for candidate in candidates],
         stated_names(experiment),
     )
     sheet = sheet.with_names(names)
@@ -265,7 +265,7 @@ def _refuse_unusable(
     experiment: Experiment, chosen: Sequence[Candidate], limits: Constraints
 ) -> None:
     """Refuse a choice without positions, or with calibrated balls that no position reads."""
-    positions = [position.item for position in chosen if isinstance(position.item, Position)]
+    positions = [one.item for one in chosen if isinstance(one.item, Position)]
     if not positions:
         every = range(limits.count)
         if limits.can_read(every):

@@ -216,20 +216,23 @@ def pool_information(
     }
     rows_always = always(drawn)
     # What is spanned and what is open does not depend on weights, but to see it these must not
-    # differ too much.
-    even_known, even_items, is_even = rows_always, items, True
+    # differ too much. Values that are exact, or far better than a position, therefore come in three
+    # weightings: as heavy as a position (`similar`), where it is seen what they determine; as exact
+    # as it makes a difference (`items`), in the information; and in between (`blocks` below), in
+    # the basis, in which both are computed.
+    similar_always, similar_items, are_similar = rows_always, items, True
     weight = _position_weight(drawn)
     if any(_differs(rows, weight) for rows in [*rows_always, *chain(*items.values())]):
-        is_even = False
-        even_known = [_weighted(rows, weight, weight) for rows in rows_always]
-        even_items = {
+        are_similar = False
+        similar_always = [_weighted(rows, weight, weight) for rows in rows_always]
+        similar_items = {
             k: [_weighted(rows, weight, weight) for rows in item] for k, item in items.items()
         }
         items = {
             k: [_weighted(rows, 0.0, EXACTLY * weight) for rows in item]
             for k, item in items.items()
         }
-    certificates = [*even_known, *chain(*even_items.values())]
+    certificates = [*similar_always, *chain(*similar_items.values())]
     balls = _combinations(drawn, certificates, all_balls)
     size = balls.shape[2] + drawn.shared
     bytes_each = 8 * size**2
@@ -254,17 +257,20 @@ def pool_information(
         rows = next(of_positions)
         pool_rows.append(_reduced(_in_amounts(rows, balls)))
         pose_ranks.append(_range(rows.by_pose).shape[1])
-    if is_even:
+    if are_similar:
         basis, open_ = _basis(balls, drawn.shared, [base, *pool_rows])
     else:
-        even = [np.concatenate([_in_amounts(rows, balls) for rows in even_known]), *pool_rows]
-        mild = [base, *pool_rows]
-        for k, item in even_items.items():
-            even[k + 1] = np.concatenate([_in_amounts(rows, balls) for rows in item])
-            mild[k + 1] = np.concatenate(
+        similar = [
+            np.concatenate([_in_amounts(rows, balls) for rows in similar_always]),
+            *pool_rows,
+        ]
+        blocks = [base, *pool_rows]
+        for k, item in similar_items.items():
+            similar[k + 1] = np.concatenate([_in_amounts(rows, balls) for rows in item])
+            blocks[k + 1] = np.concatenate(
                 [_in_amounts(_weighted(r, 0.0, MILDLY * weight), balls) for r in items[k]]
             )
-        basis, open_ = _basis(balls, drawn.shared, mild, even)
+        basis, open_ = _basis(balls, drawn.shared, blocks, similar)
 
     def in_basis(rows: Array) -> Array:
         return basis.rows(rows[:, : balls.shape[2]], rows[:, balls.shape[2] :])
@@ -278,7 +284,7 @@ def pool_information(
     transformed = in_basis(base)
     has_rows = tuple(len(rows) > 0 for rows in pool_rows)
     unplaced = _unplaced(drawn, candidates, basis, all_balls, has_rows)
-    frames = replace(_frames(drawn, even_known, even_items, basis), artefacts=unplaced)
+    frames = replace(_frames(drawn, similar_always, similar_items, basis), artefacts=unplaced)
     own_base = transformed.T @ transformed
     return Information(
         drawn,
@@ -361,13 +367,13 @@ def _motions(design: Design) -> Array:
     n, d = design.balls.places.shape
     parts = []
     for artefact in design.artefacts.plates:
-        motions = design.balls.of(artefact)
-        places = design.balls.places[motions]
-        shifts = np.broadcast_to(np.eye(d), (len(motions), d, d))
+        balls = design.balls.of(artefact)
+        places = design.balls.places[balls]
+        shifts = np.broadcast_to(np.eye(d), (len(balls), d, d))
         turns = rotation_sensitivity(places - places.mean(axis=0))
-        moved = _range(np.concatenate([shifts, turns], axis=2).reshape(len(motions) * d, -1))
+        moved = _range(np.concatenate([shifts, turns], axis=2).reshape(len(balls) * d, -1))
         parts.append(np.zeros((n, d, moved.shape[1])))
-        parts[-1][motions] = moved.reshape(len(motions), d, -1)
+        parts[-1][balls] = moved.reshape(len(balls), d, -1)
     return np.concatenate([np.zeros((n, d, 0)), *parts], axis=2)
 
 
@@ -381,15 +387,15 @@ def _combinations(drawn: PoolDesign, certificates: list[CandidateRows], all_ball
     """
     n, d = drawn.design.balls.places.shape
     of_plates = np.repeat(np.isin(np.arange(n), drawn.design.plate_balls), d)
-    every, most = np.eye(n * d)[:, of_plates], int(of_plates.sum())
+    all_coordinates, most = np.eye(n * d)[:, of_plates], int(of_plates.sum())
     span = _Span(
         _motions(drawn.design).reshape(n * d, -1),
         keeps=any(rows.frame for rows in certificates),
     )
     if all_balls:
-        span.add(every)
+        span.add(all_coordinates)
     for rows in certificates:
-        span.add(_by_balls(rows, np.eye(len(rows)), n) if len(rows) <= n * d else every)
+        span.add(_by_balls(rows, np.eye(len(rows)), n) if len(rows) <= n * d else all_coordinates)
     kinds: dict[bytes, Array] = {}
     for rows in position_rows(drawn):
         if span.rank >= most:
@@ -398,7 +404,7 @@ def _combinations(drawn: PoolDesign, certificates: list[CandidateRows], all_ball
         kind = _kind(rows, n)
         kinds.setdefault(kind.round(9).tobytes(), kind)
         if len(kinds) > MOST_KINDS:
-            span.add(every)
+            span.add(all_coordinates)
     grown = -1
     while grown != span.rank and span.rank < most:
         grown = span.rank
@@ -462,17 +468,18 @@ class _Span:
 
 
 def _basis(
-    balls: Array, shared: int, every: list[Array], even: list[Array] | None = None
+    balls: Array, shared: int, blocks: list[Array], similar: list[Array] | None = None
 ) -> tuple[InformationBasis, Array]:
     """Return a basis in which the information of all rows together is the identity, and the
     omitted directions (shared, open).
 
-    `even` are the same rows with similar weights, used if those of `every` differ too much.
+    `blocks` (m, y + shared) are rows of one candidate each; `similar` the same with similar
+    weights, used if those of `blocks` differ too much.
     """
     y = balls.shape[2]
     triangle = np.zeros((0, y + shared))
-    for some in _batches(every if even is None else even, 4 * (y + shared)):
-        triangle = np.asarray(np.linalg.qr(np.concatenate([triangle, *some]), mode="r"))
+    for batch in _batches(blocks if similar is None else similar, 4 * (y + shared)):
+        triangle = np.asarray(np.linalg.qr(np.concatenate([triangle, *batch]), mode="r"))
     triangle = np.concatenate([triangle, np.zeros((y + shared, y + shared))])[: y + shared]
     left_vectors, of_balls, by_balls = svd(triangle[:y, :y])
     is_read = of_balls > EXACT * of_balls.max(initial=0.0)
@@ -483,7 +490,7 @@ def _basis(
     # Where balls take up all of them, the largest that is left is rounding, too.
     is_known = values > EXACT * np.linalg.norm(triangle[:, y:])
     ball_open, open_ = by_balls[~is_read].T, right[~is_known].T
-    if even is None:
+    if similar is None:
         ball_root = by_balls[is_read].T / of_balls[is_read]
         ball_shared = ball_root @ left_vectors[:, is_read].T @ triangle[:y, y:]
         return (
@@ -493,7 +500,7 @@ def _basis(
             open_,
         )
     collected = Collected(int(is_read.sum()), shared)
-    for rows in every:
+    for rows in blocks:
         collected.add(np.concatenate([rows[:, :y] @ by_balls[is_read].T, rows[:, y:]], axis=1))
     combined = collected.found()
     ball_root = by_balls[is_read].T @ _inverse(combined)
@@ -519,14 +526,14 @@ def _inverse(triangle: Triangle) -> Array:
     return inverse
 
 
-def _batches(every: list[Array], size: int) -> Iterator[list[Array]]:
-    some = []
-    for rows in every:
-        some.append(rows)
-        if sum(map(len, some)) > size:
-            yield some
-            some = []
-    yield some
+def _batches(blocks: list[Array], size: int) -> Iterator[list[Array]]:
+    batch = []
+    for rows in blocks:
+        batch.append(rows)
+        if sum(map(len, batch)) > size:
+            yield batch
+            batch = []
+    yield batch
 
 
 def _placing(candidates: Sequence[Candidate], artefact: str) -> tuple[int, ...]:

@@ -264,7 +264,7 @@ class Campaign(Result):
 
 def _interrupted(campaign: Campaign) -> list[str]:
     """Return lines on positions that were read in part."""
-    names = {position.name for position in campaign.chosen}
+    names = {candidate.name for candidate in campaign.chosen}
     lines = []
     for position in campaign.interrupted:
         count = number_of(position.readings, "reading")

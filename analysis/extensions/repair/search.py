@@ -81,7 +81,7 @@ def change_pool(experiment: Experiment, changes: Sequence[Change]) -> ChangePool
     # All offsets are as uncertain as those that a repair is judged with.
     loose = with_offsets(replace(experiment, probes={**experiment.probes, **tips}), OFFSET_TRIAL)
     # Drift depends on the order of readings, which changes do not state.
-    influences = tuple(some for some in experiment.influences if not some.in_order)
+    influences = tuple(kind for kind in experiment.influences if not kind.in_order)
     evaluation = replace(experiment.evaluation, points=_points(experiment))
     steady = replace(loose, influences=influences, evaluation=evaluation)
 

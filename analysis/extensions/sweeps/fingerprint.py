@@ -13,9 +13,8 @@ from typing import Any
 
 import numpy as np
 from ballplate.simulator.experiment import Experiment
+from ballplate.simulator.inputs import service
 from pydantic import BaseModel
-
-from ..own_models import PythonCalibration, PythonSettings, module_source
 
 # Without influence on the result: names, positions in files, and how data were read.
 LEFT_OUT = frozenset(
@@ -60,9 +59,9 @@ def _plain(value: Any) -> Any:
         content = {field.name: getattr(value, field.name) for field in fields(value)}
     else:
         raise TypeError(f"no fingerprint of a {kind}")
-    if isinstance(value, PythonSettings):
+    if kind == "PythonSettings":
         content["module"] = _module_text(value.object, value._folder)
-    elif isinstance(value, PythonCalibration):
+    elif kind == "PythonCalibration":
         content["module"] = _module_text(value.object, value.source)
     left_out = LEFT_OUT | LEFT_OUT_OF.get(kind, set())
     return [kind, {name: item for name, item in content.items() if name not in left_out}]
@@ -70,7 +69,7 @@ def _plain(value: Any) -> Any:
 
 def _module_text(made_by: str, folder: Path | None) -> str:
     """Return the text of the module with the object `made_by`; empty if it is not in Python."""
-    path = module_source(made_by, folder)
+    path = service("module_source")(made_by, folder)
     if path is None or path.suffix != ".py" or not path.is_file():
         return ""
     return path.read_text(encoding="utf-8", errors="replace")
