@@ -310,6 +310,25 @@ def test_an_option_names_the_extension_that_it_needs(
     assert not list(tmp_path.glob("*.html"))
 
 
+def test_a_function_names_the_extension_that_it_needs() -> None:
+    code = (
+        OPTION_WITHOUT.split("sys.exit")[0]
+        + """
+import ballplate as bp
+
+try:
+    bp.reliability(bp.quickstart())
+except bp.MissingExtensionError as error:
+    assert "extension influences is not installed" in str(error)
+else:
+    raise AssertionError
+"""
+    )
+    command = [sys.executable, "-c", code, "", "", "influences"]
+    ended = subprocess.run(command, capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stderr
+
+
 @pytest.fixture
 def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[[str], None]]:
     """Installs a package of a laboratory's own, with what it registers."""

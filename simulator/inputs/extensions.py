@@ -14,11 +14,11 @@ import sys
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, wraps
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from types import ModuleType
+from types import FunctionType, ModuleType
 from typing import TYPE_CHECKING, Any
 
 from .unusable import UnusableError
@@ -331,4 +331,21 @@ def function(name: str) -> Any:
     :raises KeyError: no extension provides it.
     :raises MissingExtensionError: its extension is not installed.
     """
-    return getattr(module_with("functions", name), name)
+    value = getattr(module_with("functions", name), name)
+    are_all_there = all(extension.is_installed for extension in shipped())
+    return value if are_all_there or not isinstance(value, FunctionType) else _naming(value)
+
+
+def _naming(function: FunctionType) -> Any:
+    """Return a function that names the extension that it lacks when it is called."""
+
+    @wraps(function)
+    def named(*arguments: Any, **settings: Any) -> Any:
+        try:
+            return function(*arguments, **settings)
+        except ModuleNotFoundError as error:
+            if (gone := missing(error)) is not None:
+                raise gone from None
+            raise
+
+    return named
