@@ -8,15 +8,7 @@ from ballplate.simulator.inputs.faces import lazily
 
 # Public names of this package: extensions import these alone, and its modules are private.
 if TYPE_CHECKING:
-    from .verdicts import (
-        Direction,
-        Verdict,
-        length,
-        moved_positions,
-        null_changes,
-        rank_complaint,
-        verdict,
-        weak_changes,
-    )
+    from .directions import Direction, length, moved_positions
+    from .verdicts import Verdict, null_changes, rank_complaint, verdict, weak_changes
 
 __getattr__, __dir__ = lazily(__name__, __file__)

@@ -13,14 +13,8 @@ import ballplate as bp
 import numpy as np
 import pytest
 import yaml
-from ballplate.rank.verdicts import (
-    Direction,
-    FunctionPart,
-    PositionPart,
-    in_words,
-    null_changes,
-    null_directions,
-)
+from ballplate.rank.directions import Direction, FunctionPart, PositionPart, in_words
+from ballplate.rank.verdicts import null_changes, null_directions
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.experiment.layout import lay_out
 from numpy.typing import NDArray

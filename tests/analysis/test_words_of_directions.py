@@ -7,7 +7,8 @@ from itertools import product
 import ballplate as bp
 import numpy as np
 import pytest
-from ballplate.rank.verdicts import deformation, shape
+from ballplate.rank.curve_shapes import shape
+from ballplate.rank.deformations import deformation
 
 from tests.analysis import wording
 from tests.reference.small_quickstart import small_sections
