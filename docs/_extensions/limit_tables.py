@@ -18,10 +18,10 @@ from ballplate.montecarlo import trial_runs
 from ballplate.simulator.design import lookup
 from ballplate.simulator.design.observations import distances, joint_values
 from ballplate.simulator.experiment import (
-    checks,
     priors,
     references,
     sections,
+    size_checks,
     variants,
 )
 from ballplate.simulator.geometry import artefacts, listed_directions
@@ -49,14 +49,14 @@ LIMITS = {
             artefacts.MOST_BALLS,
             references.MOST_BALLS_OF_ALL,
         ),
-        "shared parameters: poses, machine errors, probe offsets": (checks.MOST_SHARED,),
+        "shared parameters: poses, machine errors, probe offsets": (size_checks.MOST_SHARED,),
         "balls that calibrated distances tie together": (distances.MOST_TIED_BALLS,),
         "correlated values of one calibration item": (joint_values.MOST_JOINT_VALUES,),
-        "lengths of standards, one for each position and probe": (checks.MOST_LENGTHS,),
-        "lengths of one standard that share balls": (checks.MOST_JOINT_LENGTHS,),
+        "lengths of standards, one for each position and probe": (size_checks.MOST_LENGTHS,),
+        "lengths of one standard that share balls": (size_checks.MOST_JOINT_LENGTHS,),
         "directions of a gauge": (listed_directions.MOST_DIRECTIONS,),
         "evaluation points": (sections.MOST_POINTS,),
-        "evaluation points times axes times machine errors": (checks.MOST_DERIVATIVES,),
+        "evaluation points times axes times machine errors": (size_checks.MOST_DERIVATIVES,),
         "measuring tasks": (settings.MOST_SEVERAL,),
         "priors": (priors.MOST_PRIORS,),
         "variants, and balls, values and points of all": (

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     )
     from .calibrations import resolve_calibration
     from .changes import node_of
-    from .checks import check_inside, check_lengths
+    from .inside_checks import check_inside
     from .json_schema import DRAFT, schema, tidied
     from .layout import lay_out
     from .loading import build, load, trees_of, with_pool
@@ -70,6 +70,7 @@ if TYPE_CHECKING:
         ReadingsSettings,
     )
     from .sections import Line, MapPriorSettings, Seed, VolumeSettings
+    from .size_checks import check_lengths
     from .spans import unspanned
     from .structure import Sections
     from .variants import (

@@ -20,8 +20,8 @@ from ..design.lookup import References
 from ..design.observations.priors import Priors
 from ..inputs.messages import ExperimentError
 from ..machines.protocol import Integers
-from .checks import MOST_SHARED
 from .model import Experiment, Position
+from .size_checks import MOST_SHARED
 from .structure import Sections
 
 

@@ -22,17 +22,10 @@ from ..machines.true_machine_settings import with_model_defaults
 from .bounds import resolve_bounds
 from .calibrations import resolve_calibration
 from .changes import node_of
-from .checks import (
-    check_calibration_read,
-    check_error_model,
-    check_inside,
-    check_names,
-    check_radii,
-    check_size,
-    check_true_machine,
-    check_use,
-)
+from .checks import check_calibration_read, check_names, check_radii, check_use
+from .error_model_checks import check_true_machine, with_usable_error_model
 from .influences import resolve_influences
+from .inside_checks import check_inside
 from .machine import resolve_evaluation, resolve_machine, resolve_noise, target_of
 from .model import Evaluation, Experiment, Position
 from .needed_services import needed_service
@@ -44,6 +37,7 @@ from .probes import resolve_probes, resolve_stars
 from .readings_checks import check_readings
 from .readings_section import no_settings
 from .references import resolve_references
+from .size_checks import check_size
 from .spans import unspanned
 from .structure import validate_sections
 from .variants import MOST_OF_ALL, in_variants, variant_trees
@@ -197,7 +191,7 @@ def _build(
         references = replace(references, volume=machine.volume)
     probes = resolve_probes(sections, references)
     bounds = resolve_bounds(sections, machine, probes, references)
-    check_error_model(sections, machine, references)
+    sections = with_usable_error_model(sections, machine, references)
     check_true_machine(sections, machine, references)
     for section in ("positions", "calibration"):
         for i in range(written_count(root, section)):

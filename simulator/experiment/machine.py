@@ -19,7 +19,7 @@ from ..inputs.problems import Problems
 from ..inputs.quantities import LengthFunction, Target, format_length, typed_length
 from ..inputs.settings import hint
 from ..inputs.tables import read_table
-from .checks import TOLERANCE, check_points
+from .inside_checks import TOLERANCE, check_points
 from .model import Evaluation, Probe, Task
 from .sections import MOST_POINTS, MachineSettings, PointsSettings, TaskSettings
 from .structure import Sections

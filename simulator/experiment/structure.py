@@ -63,6 +63,11 @@ class Sections:
         """Return the value of a path, or None if it is missing or invalid."""
         return self.values.get(steps)
 
+    def without(self, section: str) -> Sections:
+        """Return the sections but for one, as if it were missing or invalid."""
+        kept = {steps: value for steps, value in self.values.items() if steps != (section,)}
+        return replace(self, values=kept)
+
     def entries(self, section: str) -> dict[str | int, Any]:
         """Return the right entries of a section by key or index, in the order of the file."""
         return {

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.simulator.design import objects
-from ballplate.simulator.experiment import checks
+from ballplate.simulator.experiment import inside_checks
 from ballplate.simulator.experiment.json_schema import schema
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment, Position
@@ -102,7 +102,7 @@ def accepts(folder: Path, position: str, end: str) -> bool:
 @pytest.fixture
 def without_play(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the loader accept no scale readings outside the volume but for rounding."""
-    for module in (objects, checks):
+    for module in (objects, inside_checks):
         monkeypatch.setattr(module, "SLIGHTLY", 1e-9)
 
 
