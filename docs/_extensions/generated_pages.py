@@ -18,8 +18,7 @@ from ballplate.extensions.machine_files.machine_sections import schema as machin
 from ballplate.extensions.machine_files.map_sections import schema as map_schema
 from ballplate.extensions.sweeps.sweep_schema import schema as sweep_schema
 from ballplate.simulator.experiment.json_schema import schema
-from ballplate.simulator.inputs.quantities import (
-    KINDS,
+from ballplate.simulator.inputs.quantity_types import (
     Angle,
     Bending,
     Duration,
@@ -29,6 +28,7 @@ from ballplate.simulator.inputs.quantities import (
     TargetFunction,
     TemperatureDifference,
 )
+from ballplate.simulator.inputs.units import KINDS
 from pydantic import TypeAdapter
 from sphinx.application import Sphinx
 

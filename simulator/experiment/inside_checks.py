@@ -12,7 +12,7 @@ from ..geometry.positions import ball_coordinates
 from ..inputs.messages import Steps
 from ..inputs.number_arrays import Array
 from ..inputs.problems import Problems
-from ..inputs.quantities import format_length
+from ..inputs.quantity_words import format_length
 from ..inputs.settings import number_of
 from ..inputs.yamltree import Mark
 from .model import Position, Probe

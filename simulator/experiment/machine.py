@@ -16,7 +16,8 @@ from ..geometry.ball_layouts import frozen
 from ..inputs.messages import ExperimentError, Steps
 from ..inputs.number_arrays import Array
 from ..inputs.problems import Problems
-from ..inputs.quantities import LengthFunction, Target, format_length, typed_length
+from ..inputs.quantities import LengthFunction, Target
+from ..inputs.quantity_words import format_length, typed_length
 from ..inputs.settings import hint
 from ..inputs.tables import read_table
 from .inside_checks import TOLERANCE, check_points

@@ -12,7 +12,7 @@ from ..design.observations.kinds import CALIBRATIONS
 from ..geometry.ball_layouts import Name
 from ..geometry.positions import Axis
 from ..inputs.open_kinds import OpenKinds
-from ..inputs.quantities import Duration, Length
+from ..inputs.quantity_types import Duration, Length
 from ..inputs.room_parts import Place, RoomPart
 from ..inputs.settings import Forms, NonEmpty, Settings, Several, Text
 from .position_sections import Count, LengthPerAxis, PositionSettings, ProbeNames, QuarterTurns

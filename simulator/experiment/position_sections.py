@@ -8,7 +8,7 @@ from pydantic import Field
 
 from ..geometry.ball_layouts import BallNames, Name
 from ..geometry.positions import Axis
-from ..inputs.quantities import Angle, PositiveLength
+from ..inputs.quantity_types import Angle, PositiveLength
 from ..inputs.room_parts import Place
 from ..inputs.settings import Forms, NonEmpty, Settings
 

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from ..geometry.ball_layouts import Coordinates, Name
-from ..inputs.quantities import Angle, PositiveLength
+from ..inputs.quantity_types import Angle, PositiveLength
 from ..inputs.settings import Forms, Settings, Text
 from .position_sections import LengthPerAxis
 

@@ -6,8 +6,9 @@ import codecs
 
 from ..design.lookup import References
 from ..inputs.messages import ExperimentError, Steps
-from ..inputs.quantities import LENGTH_UNITS, QuantityError, parse_positive_length, plain_unit
+from ..inputs.quantities import QuantityError, parse_positive_length
 from ..inputs.settings import hint
+from ..inputs.units import LENGTH_UNITS, plain_unit
 from .name_rules import check_rule
 from .needed_services import needed_service
 from .readings_section import ColumnsSettings, CompensationSettings, ReadingsSettings

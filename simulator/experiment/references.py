@@ -17,7 +17,7 @@ from ..geometry.ball_layouts import (
 )
 from ..inputs.messages import ExperimentError, Steps
 from ..inputs.problems import Problems, written_keys
-from ..inputs.quantities import format_length
+from ..inputs.quantity_words import format_length
 from ..inputs.settings import hint, shorten
 from ..inputs.tables import read_table
 from ..inputs.trust import Trust

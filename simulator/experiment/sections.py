@@ -14,7 +14,7 @@ from ..design.observations.kinds import CalibrationSettings
 from ..geometry.artefacts import ARTEFACTS, AnyArtefactSettings
 from ..geometry.ball_layouts import Coordinates, Name
 from ..inputs.days import Day
-from ..inputs.quantities import Length, PositiveLength, TargetFunction
+from ..inputs.quantity_types import Length, PositiveLength, TargetFunction
 from ..inputs.settings import Forms, NonEmpty, Settings, Several, Text
 from ..machines.settings import ErrorModelSettings
 from ..machines.true_machine_settings import TrueMachineSettings, ZeroSettings

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from ..inputs.messages import Steps
 from ..inputs.problems import Problems
-from ..inputs.quantities import format_length
+from ..inputs.quantity_words import format_length
 
 
 def check_ends(ends: Mapping[str, tuple[float, float]], steps: Steps, problems: Problems) -> bool:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, Self, Union
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from ..inputs.open_kinds import OpenKinds
-from ..inputs.quantities import PositiveLength
+from ..inputs.quantity_types import PositiveLength
 from .ball_layouts import (
     MOST_BALLS,
     ArtefactSettings,

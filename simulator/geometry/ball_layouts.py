@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, StringConstraints, model_validator
 
 from ..inputs.number_arrays import Array
-from ..inputs.quantities import Length, PositiveLength
+from ..inputs.quantity_types import Length, PositiveLength
 from ..inputs.settings import NonEmpty, Settings, listing, nearest, shorten
 
 MOST_BALLS = 40_000

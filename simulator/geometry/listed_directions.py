@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ..inputs.number_arrays import Array
-from ..inputs.quantities import Angle
+from ..inputs.quantity_types import Angle
 from ..inputs.settings import Forms, Settings
 
 MOST_DIRECTIONS = 5000

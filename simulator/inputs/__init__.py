@@ -50,36 +50,13 @@ if TYPE_CHECKING:
     )
     from .problems import Problems, in_order, written_count, written_text
     from .quantities import (
-        ANGLE_UNITS,
-        DURATION_UNITS,
-        KINDS,
-        LENGTH_UNITS,
         PARSERS,
         QUANTITY,
         SMALLEST,
-        Angle,
-        Bending,
-        CommonPart,
-        Duration,
-        Expansion,
-        Length,
-        LengthDrift,
         LengthFunction,
-        PositiveAngle,
-        PositiveLength,
-        PositiveTemperatureDifference,
         QuantityError,
-        Ratio,
-        RatioDrift,
         Target,
-        Temperature,
-        TemperatureDifference,
-        Units,
         exact_number,
-        format_angle,
-        format_duration,
-        format_length,
-        length_text,
         metres_or_radians,
         parse_angle,
         parse_duration,
@@ -89,9 +66,30 @@ if TYPE_CHECKING:
         parse_positive_length,
         parse_positive_temperature_difference,
         parse_ratio,
-        plain_unit,
-        typed_length,
         with_quantities,
+    )
+    from .quantity_types import (
+        Angle,
+        Bending,
+        CommonPart,
+        Duration,
+        Expansion,
+        Length,
+        LengthDrift,
+        PositiveAngle,
+        PositiveLength,
+        PositiveTemperatureDifference,
+        Ratio,
+        RatioDrift,
+        Temperature,
+        TemperatureDifference,
+    )
+    from .quantity_words import (
+        format_angle,
+        format_duration,
+        format_length,
+        length_text,
+        typed_length,
     )
     from .room_parts import Place, RoomPart, length_of, place_text
     from .settings import (
@@ -119,6 +117,7 @@ if TYPE_CHECKING:
         table_lines,
     )
     from .trust import OPENED, UNKNOWN, Trust
+    from .units import ANGLE_UNITS, DURATION_UNITS, KINDS, LENGTH_UNITS, Units, plain_unit
     from .unusable import UnusableError
     from .validation import validated
     from .yaml_writing import yaml_text

@@ -7,122 +7,25 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
 from functools import partial
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
-from pydantic_core import CoreSchema, core_schema
 
 from .number_arrays import Array
 from .settings import describe, hint, shorten
+from .units import KINDS, plain_unit
 
-# Sizes of units in SI, by their names.
-Factors = Mapping[str, Fraction]
-# Units of several columns, or kinds of quantities.
-Units = Mapping[str, Factors]
-
-PI = Fraction("3.14159265358979323846264338327950288419716939937510582")
-
-
-def _exact(sizes: Mapping[str, str]) -> Factors:
-    return {unit: Fraction(size) for unit, size in sizes.items()}
-
-
-LENGTH_UNITS = _exact(
-    {
-        "m": "1",
-        "dm": "0.1",
-        "cm": "0.01",
-        "mm": "1e-3",
-        "um": "1e-6",
-        "nm": "1e-9",
-        "pm": "1e-12",
-        "in": "0.0254",
-    }
-)
-ANGLE_UNITS = {
-    **_exact({"rad": "1", "mrad": "1e-3", "urad": "1e-6", "nrad": "1e-9"}),
-    "deg": PI / 180,
-    "arcmin": PI / (180 * 60),
-    "arcsec": PI / (180 * 3600),
-}
-RATIO_UNITS = _exact(
-    {
-        "ppm": "1e-6",
-        "ppb": "1e-9",
-        "%": "0.01",
-        "m/m": "1",
-        "mm/m": "1e-3",
-        "um/m": "1e-6",
-        "nm/m": "1e-9",
-    }
-)
-DURATION_UNITS = _exact({"s": "1", "min": "60", "h": "3600"})
-
-
-def _per_hour(sizes: Factors, units: Sequence[str]) -> Factors:
-    return {
-        f"{unit}/{time}": sizes[unit] * 3600 / seconds
-        for time, seconds in sorted(DURATION_UNITS.items())
-        for unit in units
-    }
-
-
-@dataclass(frozen=True)
-class Kind:
-    """A kind of quantity: its `units`, the `base` in which it is kept, and texts for messages.
-
-    `alternative` is a second unit to suggest for a number without one: one alone would lead to
-    errors of a factor of a thousand. `small` is a small quantity, and `above_zero` an example of
-    one that must be above zero.
-    """
-
-    units: Factors
-    base: str
-    example: str
-    alternative: str = ""
-    small: str = ""
-    above_zero: str = ""
-
-
-KINDS: Mapping[str, Kind] = {
-    "length": Kind(LENGTH_UNITS, "m", "750 mm", "um", "1 nm", "0.2 um"),
-    "angle": Kind(ANGLE_UNITS, "rad", "2 arcsec", "deg", "1 nrad", "2 arcsec"),
-    "ratio": Kind(RATIO_UNITS, "m/m", "5 ppm", "m/m"),
-    "temperature difference": Kind(
-        _exact({"K": "1", "degC": "1", "mK": "1e-3"}), "K", "1.5 degC", "", "1 mK", "1.5 degC"
-    ),
-    "thermal expansion": Kind(
-        {
-            f"{ratio}/{degree}": RATIO_UNITS.get(ratio, Fraction(1))
-            for ratio in ("um/m", "ppm", "mm/m", "m/m", "1")
-            for degree in ("K", "degC")
-        },
-        "m/m/K",
-        "11 um/m/degC",
-        "m/m/K",
-    ),
-    "angle per length": Kind(
-        {f"{unit}/m": factor for unit, factor in ANGLE_UNITS.items()}, "rad/m", "5 urad/m"
-    ),
-    "duration": Kind(DURATION_UNITS, "s", "20 min", "s"),
-    "length per time": Kind(_per_hour(LENGTH_UNITS, ["um", "nm", "mm", "m"]), "m/h", "0.5 um/h"),
-    "ratio per time": Kind(
-        _per_hour(RATIO_UNITS, ["ppm", "um/m", "nm/m", "m/m"]), "m/m/h", "0.3 ppm/h"
-    ),
-}
 # Beyond these, squares and their sums overflow or vanish.
 LARGEST, SMALLEST = 10**6, Fraction(1, 10**18)
 SMALLEST_FLOAT = float(SMALLEST)
 LENGTH_FUNCTION_EXAMPLE = "0.5 um + L/1000000"
-
 NUMBER = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,6})?"
 QUANTITY = re.compile(rf"({NUMBER})\s*((?:(?<=\s)1/|[^\s0-9.+-]).*)?")
 # A constant, and what is added for each metre: a divisor of L, or a ratio.
@@ -253,54 +156,6 @@ def parse_duration(value: object) -> float:
     if seconds < 0:
         raise QuantityError(f'"{value}" is below zero; write for example "20 min"')
     return seconds
-
-
-def length_text(length: float) -> str:
-    """Return a length in metres with a unit, so that reading it gives the same float.
-
-    >>> length_text(0.75), length_text(2e-7), length_text(1 / 3)
-    ('750 mm', '0.2 um', '333.3333333333333 mm')
-    """
-    unit, shift = ("mm", 3) if length == 0 or abs(length) >= 1e-4 else ("um", 6)
-    return f"{Decimal(repr(float(length) + 0.0)).scaleb(shift).normalize():f} {unit}"
-
-
-def format_duration(seconds: float) -> str:
-    """Return a duration with the largest unit in which it is at least one.
-
-    >>> format_duration(5400), format_duration(735), format_duration(0)
-    ('1.5 h', '12.25 min', '0 s')
-    """
-    unit = "h" if seconds >= 3600 else "min" if seconds >= 60 else "s"
-    return f"{seconds / float(DURATION_UNITS[unit]):.9g} {unit}"
-
-
-def typed_length(length: float) -> str:
-    """Return a length in metres as typed into a file, with a suitable unit.
-
-    >>> typed_length(0.75), typed_length(2e-7), typed_length(-0.0)
-    ('750 mm', '0.2 um', '0 mm')
-    """
-    unit = "mm" if length == 0 or abs(length) >= 1e-4 else "um" if abs(length) >= 1e-8 else "nm"
-    return f"{length / float(LENGTH_UNITS[unit]) + 0.0:.9g} {unit}"
-
-
-def format_length(length: float) -> str:
-    """Return a length in metres as text for people.
-
-    >>> format_length(0.75), format_length(2e-7)
-    ('750 mm', '0.2 µm')
-    """
-    return typed_length(length).replace(" um", " µm")
-
-
-def format_angle(angle: float) -> str:
-    """Return an angle in radians as text in microradians.
-
-    >>> format_angle(2e-6)
-    '2 µrad'
-    """
-    return f"{1e6 * angle + 0.0:.9g} µrad"
 
 
 @dataclass(frozen=True)
@@ -475,11 +330,6 @@ def _number_and_factor(value: object, kind: str) -> tuple[str, Fraction]:
     )
 
 
-def plain_unit(unit: str) -> str:
-    """Return a unit with u for the micro sign and the Greek letter."""
-    return unit.strip().replace("µ", "u").replace("μ", "u")
-
-
 def _article(kind: str) -> str:
     return f"an {kind}" if kind[0] in "aeiou" else f"a {kind}"
 
@@ -490,81 +340,3 @@ def _with_unit(number: str, kind: str) -> str:
         return f'write "{number} {about.base}" if it is in {about.base}'
     units = (about.example.split()[1], about.alternative)
     return "write for example " + " or ".join(f'"{number} {unit}"' for unit in units if unit)
-
-
-@dataclass(frozen=True)
-class StatedForm:
-    """How a file states a quantity: its reader, and a pattern and examples for the schema."""
-
-    read: Callable[[object], Any]
-    pattern: str
-    examples: tuple[str, ...]
-
-    @property
-    def json_schema(self) -> dict[str, Any]:
-        """The schema of its text."""
-        return {"type": "string", "pattern": self.pattern, "examples": list(self.examples)}
-
-    def __get_pydantic_core_schema__(
-        self, source: Any, handler: GetCoreSchemaHandler
-    ) -> CoreSchema:
-        return core_schema.no_info_plain_validator_function(self.read)
-
-    def __get_pydantic_json_schema__(
-        self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
-        return self.json_schema
-
-
-def _pattern(kind: str) -> str:
-    names = [re.escape(unit) for unit in KINDS[kind].units]
-    names += ["[µμ]" + name[1:] for name in names if name.startswith("u")]
-    return f" *{NUMBER} *({'|'.join(names)})"
-
-
-def _of(kind: str, *examples: str, **limits: bool) -> StatedForm:
-    return StatedForm(partial(parse_quantity, kind=kind, **limits), f"^{_pattern(kind)}$", examples)
-
-
-GROWING_PATTERN = f"^{_pattern('length')}( *\\+( *L */ *{NUMBER}|{_pattern('ratio')}) *)?$"
-GROWING_EXAMPLES = (LENGTH_FUNCTION_EXAMPLE, "0.9 um + 2.5 um/m")
-
-Length = Annotated[float, _of("length", "750 mm", "0.2 um", "12.5 in")]
-PositiveLength = Annotated[float, _of("length", "750 mm", "0.2 um", above_zero=True)]
-LengthUncertainty = Annotated[float, _of("length", "0.2 um", "0 um", above_zero=True, or_zero=True)]
-TargetFunction = Annotated[
-    LengthFunction,
-    StatedForm(parse_length_function, GROWING_PATTERN, ("0.2 um", *GROWING_EXAMPLES)),
-]
-UncertaintyFunction = Annotated[
-    LengthFunction,
-    StatedForm(
-        partial(parse_length_function, or_zero=True),
-        GROWING_PATTERN,
-        ("0.2 um", "0 um", *GROWING_EXAMPLES),
-    ),
-]
-CommonPart = Annotated[
-    LengthFunction,
-    StatedForm(
-        parse_common_part,
-        f"{GROWING_PATTERN}|^{_pattern('ratio')}$",
-        ("0.5 um/m", "0.1 um + 0.5 um/m", *GROWING_EXAMPLES),
-    ),
-]
-Angle = Annotated[float, _of("angle", "90 deg", "2 arcsec", "5 urad")]
-PositiveAngle = Annotated[float, _of("angle", "2 arcsec", "5 urad", above_zero=True)]
-TemperatureDifference = Annotated[float, _of("temperature difference", "1.5 degC", "-0.3 K")]
-PositiveTemperatureDifference = Annotated[
-    float, _of("temperature difference", "0.5 degC", above_zero=True)
-]
-Temperature = Annotated[float, StatedForm(parse_temperature, f"^ *{NUMBER} *degC$", ("20.3 degC",))]
-Expansion = Annotated[float, _of("thermal expansion", "11 um/m/degC")]
-Bending = Annotated[float, _of("angle per length", "5 urad/m")]
-Ratio = Annotated[float, _of("ratio", "5 ppm", "0.1 %", "1.2 um/m")]
-Duration = Annotated[
-    float,
-    StatedForm(parse_duration, f"^{_pattern('duration')}$", ("20 min", "15 s", "1.5 h")),
-]
-LengthDrift = Annotated[float, _of("length per time", "0.5 um/h", "-2 nm/min")]
-RatioDrift = Annotated[float, _of("ratio per time", "0.3 ppm/h")]

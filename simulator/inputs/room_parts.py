@@ -9,7 +9,9 @@ from typing import Annotated, get_args
 
 from pydantic import PlainValidator, WithJsonSchema
 
-from .quantities import Length, QuantityError, parse_length, typed_length
+from .quantities import QuantityError, parse_length
+from .quantity_types import Length
+from .quantity_words import typed_length
 from .settings import hint, shorten
 
 ENDS = {"low": 0.0, "middle": 0.5, "high": 1.0}

@@ -17,15 +17,10 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from .messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message, refused
-from .quantities import (
-    LENGTH_UNITS,
-    QuantityError,
-    Units,
-    metres_or_radians,
-    plain_unit,
-)
+from .quantities import QuantityError, metres_or_radians
 from .settings import hint, listing, shorten
 from .spreadsheets import text_of_cell
+from .units import LENGTH_UNITS, Units, plain_unit
 from .yamltree import GivenText, Mark, read_text
 
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}

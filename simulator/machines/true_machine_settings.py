@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 from pydantic import Field
 
 from ..inputs.open_kinds import OpenKinds
-from ..inputs.quantities import Angle, PositiveLength
+from ..inputs.quantity_types import Angle, PositiveLength
 from ..inputs.settings import Settings
 from .model_kinds import Corner
 from .protocol import ErrorModel, TrueMachine

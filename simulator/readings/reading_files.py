@@ -15,10 +15,10 @@ from ..design.observations.readings import expected_readings
 from ..experiment.readings_section import ReadingsSettings, no_settings
 from ..inputs.extensions import optional_service, service
 from ..inputs.messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message, refused
-from ..inputs.quantities import LENGTH_UNITS
 from ..inputs.settings import hint, listing, number_of
 from ..inputs.spreadsheets import CsvWriter
 from ..inputs.tables import FileRow
+from ..inputs.units import LENGTH_UNITS
 from ..inputs.yamltree import GivenText, Mark
 from ..machines.protocol import Array, Integers
 from .joining import ReadingKey, reading_keys, rows_of

@@ -18,9 +18,9 @@ from ..geometry.motions import AXIS_NAMES
 from ..inputs.decoding import END_OF_FILE, refuse_long_lines, text_and_encoding
 from ..inputs.extensions import optional_service
 from ..inputs.messages import ExperimentError, Message, refused
-from ..inputs.quantities import Units
 from ..inputs.settings import number_of
 from ..inputs.tables import FileRow, header_line, header_names, header_texts, read_table
+from ..inputs.units import Units
 from ..inputs.yamltree import GivenText, read_bytes
 
 Source = Path | GivenText

@@ -10,22 +10,19 @@ import numpy as np
 import pytest
 from ballplate.simulator.inputs.quantities import (
     LARGEST,
-    LENGTH_UNITS,
     SMALLEST,
-    Length,
     LengthFunction,
     QuantityError,
-    Ratio,
-    TargetFunction,
     exact_number,
-    format_length,
     parse_angle,
     parse_length,
     parse_length_function,
     parse_positive_length,
     parse_ratio,
-    typed_length,
 )
+from ballplate.simulator.inputs.quantity_types import Length, Ratio, TargetFunction
+from ballplate.simulator.inputs.quantity_words import format_length, typed_length
+from ballplate.simulator.inputs.units import LENGTH_UNITS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import TypeAdapter

@@ -17,8 +17,8 @@ from typing import ClassVar
 import numpy as np
 
 from ...inputs.messages import Steps
-from ...inputs.quantities import Units
 from ...inputs.settings import Settings
+from ...inputs.units import Units
 from ...machines.protocol import Array, Integers, Unit
 from ..lookup import References
 from ..objects import Artefacts, Balls, Machine, Positions, Probes, Readings

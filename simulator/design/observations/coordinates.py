@@ -14,7 +14,7 @@ from ...geometry.ball_layouts import BallLayout, BallNames, Name, frozen
 from ...geometry.motions import AXIS_NAMES
 from ...geometry.positions import Axis
 from ...inputs.messages import Steps
-from ...inputs.quantities import LengthUncertainty
+from ...inputs.quantity_types import LengthUncertainty
 from ...inputs.settings import Forms, Text, hint, listing
 from ...machines.protocol import Array, Integers
 from ..arrays import Design

@@ -11,7 +11,8 @@ from pydantic import Field
 
 from ...geometry.ball_layouts import COINCIDENT, BallLayout, Name, frozen, pairs
 from ...inputs.messages import Steps
-from ...inputs.quantities import LengthFunction, PositiveLength, UncertaintyFunction
+from ...inputs.quantities import LengthFunction
+from ...inputs.quantity_types import PositiveLength, UncertaintyFunction
 from ...inputs.settings import Forms, NonEmpty, Settings, Text, hint, listing
 from ...inputs.yamltree import mark_of
 from ...machines.protocol import Array, Integers

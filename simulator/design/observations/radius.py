@@ -12,7 +12,7 @@ from pydantic import Field
 from ...geometry.artefacts import BryanGaugeSettings
 from ...geometry.ball_layouts import BallLayout, Name
 from ...inputs.messages import Steps
-from ...inputs.quantities import LengthUncertainty, PositiveLength
+from ...inputs.quantity_types import LengthUncertainty, PositiveLength
 from ...inputs.settings import Settings
 from ...machines.protocol import Array, ErrorModel
 from ..arrays import Design, State

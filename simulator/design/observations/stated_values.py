@@ -16,7 +16,7 @@ from pydantic import Field
 from ...inputs.extensions import optional_service
 from ...inputs.messages import ExperimentError, Steps
 from ...inputs.problems import Problems
-from ...inputs.quantities import CommonPart
+from ...inputs.quantity_types import CommonPart
 from ...inputs.settings import Settings, Text, hint, listing, shorten
 from ...inputs.yamltree import Mark
 from ...machines.protocol import Array

@@ -11,7 +11,8 @@ import pytest
 from ballplate.extensions.laboratory.clock_times import clock_time
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.inputs.messages import ExperimentError, Message
-from ballplate.simulator.inputs.quantities import DURATION_UNITS, QuantityError
+from ballplate.simulator.inputs.quantities import QuantityError
+from ballplate.simulator.inputs.units import DURATION_UNITS
 from ballplate.simulator.inputs.yamltree import GivenText
 from ballplate.simulator.readings.reading_sources import source_rows
 

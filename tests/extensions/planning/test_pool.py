@@ -12,7 +12,8 @@ from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import AtMost, Candidate, Experiment, Pool, Position
 from ballplate.simulator.experiment.pool import placed_only
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.inputs.quantities import length_text, parse_length
+from ballplate.simulator.inputs.quantities import parse_length
+from ballplate.simulator.inputs.quantity_words import length_text
 from hypothesis import given
 from hypothesis import strategies as st
 
