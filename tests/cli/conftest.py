@@ -9,7 +9,8 @@ from typing import Any
 
 import ballplate as bp
 import pytest
-from ballplate.cli import _module_of, main
+from ballplate.cli import main
+from ballplate.cli.commands import module_of
 from ballplate.extensions.planning import campaign_choice
 
 from tests.cli.walk import BALLS, DESIGN, WALK
@@ -67,7 +68,7 @@ def idle(monkeypatch: pytest.MonkeyPatch) -> None:
         raise AssertionError(f"{options.command} has begun")
 
     for command in WALK:
-        monkeypatch.setattr(_module_of(command), "run", fail)
+        monkeypatch.setattr(module_of(command), "run", fail)
 
 
 @pytest.fixture(scope="session")

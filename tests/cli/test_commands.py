@@ -12,7 +12,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.cli import GROUPS, commands_of_all, main
+from ballplate.cli import main
+from ballplate.cli.commands import GROUPS, commands_of_all
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.machines.truth import true_parameters

@@ -12,7 +12,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.cli import _module_of, main
+from ballplate.cli import main
+from ballplate.cli.commands import module_of
 from ballplate.simulator.computing.processes import in_processes
 
 QUICKSTART = "designs/quickstart.yaml"
@@ -58,7 +59,7 @@ def test_no_memory(
     failure: Callable[..., None],
     told: str,
 ) -> None:
-    monkeypatch.setattr(_module_of("run"), "run", lambda _: failure())
+    monkeypatch.setattr(module_of("run"), "run", lambda _: failure())
     assert main(["run", QUICKSTART]) == 3
     out, err = capsys.readouterr()
     assert out == "" and err.startswith(told) and err.count("\n") == 1

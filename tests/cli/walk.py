@@ -11,7 +11,8 @@ from typing import Any
 
 import pytest
 import yaml
-from ballplate.cli import main, parser
+from ballplate.cli import main
+from ballplate.cli.parsers import parser
 
 from tests.reference.small_quickstart import small_sections
 
