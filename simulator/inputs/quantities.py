@@ -63,7 +63,7 @@ def metres_or_radians(number: str, factor: Fraction, kind: str = "length") -> fl
 
     :raises QuantityError: not a decimal number, too large or too small.
 
-    >>> metres_or_radians("750", LENGTH_UNITS["mm"])
+    >>> metres_or_radians("750", Fraction("0.001"))
     0.75
     """
     exact = exact_number(number) * factor
