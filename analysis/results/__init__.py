@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from .error_functions import estimated_curves
     from .estimates import (
         ESTIMATE_COLUMNS,
-        EstimatedFunctions,
         ParameterEstimate,
         labels,
     )

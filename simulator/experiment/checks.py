@@ -17,8 +17,6 @@ from ..inputs.settings import listing
 from .model import Position
 from .structure import Sections
 
-AXES = ("x", "y", "z")
-
 
 def check_names(position_count: int, problems: Problems) -> None:
     """Report positions that have the same name."""

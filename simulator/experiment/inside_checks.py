@@ -8,6 +8,7 @@ import numpy as np
 
 from ..design.lookup import References
 from ..design.objects import SLIGHTLY, Volume
+from ..geometry.motions import AXIS_NAMES
 from ..geometry.positions import ball_coordinates
 from ..inputs.messages import Steps
 from ..inputs.number_arrays import Array
@@ -18,7 +19,6 @@ from ..inputs.yamltree import Mark
 from .model import Position, Probe
 
 TOLERANCE = 1e-9
-AXES = ("x", "y", "z")
 
 
 def check_inside(
@@ -61,11 +61,11 @@ def check_inside(
         else ""
     )
     remedy = "move the artefact"
-    if AXES[axis] in position.parts:
-        remedy = f"there is no room along {AXES[axis]}: take a smaller artefact"
+    if AXIS_NAMES[axis] in position.parts:
+        remedy = f"there is no room along {AXIS_NAMES[axis]}: take a smaller artefact"
     text = (
         f'reading ball "{layout.names[balls[worst]]}" with probe "{probe}" moves the scales to'
-        f" {AXES[axis]} = {format_length(place - offset)}{less},"
+        f" {AXIS_NAMES[axis]} = {format_length(place - offset)}{less},"
         f" {format_length(by_how_much[worst])} {sides[worst]} the measuring volume{others_text};"
         f" {remedy}, or read it otherwise"
     )
@@ -105,8 +105,9 @@ def check_points(
             else ""
         )
         text = (
-            f"{AXES[axis]} = {format_length(points[i, axis])} is {format_length(by_how_much[i])}"
-            f" {sides[i]} the measuring volume{others_text}; move the point inside"
+            f"{AXIS_NAMES[axis]} = {format_length(points[i, axis])} is"
+            f" {format_length(by_how_much[i])} {sides[i]} the measuring volume{others_text};"
+            " move the point inside"
         )
         if marks is None:
             problems.add(steps if of_one else (*steps, int(i)), text)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args
 
 from pydantic import Field
 
@@ -73,7 +73,7 @@ if TYPE_CHECKING:
     TrueMachineSettings = Settings
 else:
     TrueMachineSettings = Annotated[
-        ZeroSettings | CoefficientSettings | RandomSettings,
+        Union[OF_KERNEL],  # noqa: UP007
         OpenKinds("true_machines", FurtherTrueMachine),
     ]
 

@@ -89,11 +89,8 @@ ALL: list[Any] = [
 ]
 
 # Lines alone whose outcomes are kept.
-KEPT = [
-    line
-    for line in kept()
-    if "  with  " not in line and line not in {getattr(row, "values", row)[0] for row in ALL}
-]
+WITH_OPTIONS = {getattr(row, "values", row)[0] for row in ALL}
+KEPT = [line for line in kept() if "  with  " not in line and line not in WITH_OPTIONS]
 
 
 def outcomes(line: str, option: str, kit: Path) -> dict[str, list[str]]:

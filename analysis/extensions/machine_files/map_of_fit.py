@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 from importlib.metadata import version
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
-from ballplate.results import ParameterEstimate
+from ballplate.results import Fit, ParameterEstimate
 from ballplate.simulator.computing import single_threaded
 from ballplate.simulator.design import Probes
 from ballplate.simulator.inputs import listing, number_of, parse_day, service, to_python, written
-from ballplate.simulator.maps import LackOfFit, MapData
+from ballplate.simulator.maps import MapData
 from ballplate.simulator.readings import ObservedReadings, fingerprint, position_fingerprints
 
 from .fitted_map import FittedMap, LeftOut, determined_only
 from .model_files import absolute
 
 if TYPE_CHECKING:
-    from ballplate.results import EstimatedFunctions
     from ballplate.simulator.experiment import Experiment
 
 # Coverage factor of experiments that state none.
@@ -38,33 +37,8 @@ FRAMES = {
 }
 
 
-class MappedFit(Protocol):
-    """The attributes of a fit that a map needs, see `Fit`."""
-
-    @property
-    def label(self) -> str: ...
-    @property
-    def experiment(self) -> Experiment | None: ...
-    @property
-    def observed(self) -> ObservedReadings: ...
-    @property
-    def sigma(self) -> float: ...
-    @property
-    def sigma_is_estimated(self) -> bool: ...
-    @property
-    def degrees_of_freedom(self) -> int: ...
-    @property
-    def sum_of_squares(self) -> float: ...
-    @property
-    def lack_of_fit(self) -> LackOfFit: ...
-    @property
-    def estimates(self) -> tuple[ParameterEstimate, ...]: ...
-    @property
-    def functions(self) -> EstimatedFunctions: ...
-
-
 @single_threaded
-def map_of(fit: MappedFit, date: str | None = None) -> FittedMap:
+def map_of(fit: Fit, date: str | None = None) -> FittedMap:
     """Return the machine's errors and estimated probe offsets with their joint covariance.
 
     :raises ValueError: the estimate has not converged, or the `date` names no day.
