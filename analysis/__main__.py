@@ -32,8 +32,7 @@ def main() -> int:
         number = getattr(signal, name, None)
         if number and signal.getsignal(number) in (signal.SIG_DFL, signal.default_int_handler):
             signal.signal(number, _leave)
-    from .cli import internal_error
-    from .cli import main as command
+    from .cli.dispatch import internal_error, main as command
 
     try:
         return command()

@@ -8,8 +8,7 @@ from __future__ import annotations
 from ballplate.extensions.diagnosis import remainders
 from ballplate.extensions.estimators import distances as estimators
 from ballplate.extensions.machine_files import curve_files, machine_sections
-from ballplate.extensions.maps import correction
-from ballplate.extensions.maps import volumetric_errors as volumetric
+from ballplate.extensions.maps import correction, volumetric_errors as volumetric
 from ballplate.extensions.planning import criteria, information, pool_groups
 from ballplate.extensions.requirements import root_search
 from ballplate.extensions.splines import error_curve, read_points

@@ -27,10 +27,10 @@ from .objects import (
     Machine,
     Positions,
     Probes,
+    Readings as Readings,
     Tasks,
     UnknownLengths,
 )
-from .objects import Readings as Readings
 
 Made = TypeVar("Made")
 Kind = TypeVar("Kind", bound="Observations")

@@ -17,8 +17,7 @@ from ..inputs.number_arrays import Array
 from ..inputs.problems import Problems, written_text
 from ..inputs.settings import hint, listing, shorten
 from ..inputs.trust import UNKNOWN, Trust
-from ..inputs.yamltree import Sequence as SequenceNode
-from ..inputs.yamltree import written
+from ..inputs.yamltree import Sequence as SequenceNode, written
 from .objects import Volume
 
 Indices = NDArray[np.intp]

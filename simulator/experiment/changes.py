@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping as AnyMapping
-from collections.abc import Sequence as AnySequence
+from collections.abc import Mapping as AnyMapping, Sequence as AnySequence
 from pathlib import Path
 from typing import Any
 

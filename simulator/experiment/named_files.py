@@ -13,8 +13,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path, PureWindowsPath
 
 from ..inputs.messages import ExperimentError
-from ..inputs.yamltree import Mapping, Node, Scalar, read_tree
-from ..inputs.yamltree import Sequence as Entries
+from ..inputs.yamltree import Mapping, Node, Scalar, Sequence as Entries, read_tree
 from .modules import python_models
 
 MODULE = ".py"

@@ -21,8 +21,7 @@ from ..inputs.quantity_words import format_length
 from ..inputs.settings import hint, shorten
 from ..inputs.tables import read_table
 from ..inputs.trust import Trust
-from ..inputs.yamltree import Mapping, Node, written
-from ..inputs.yamltree import Sequence as SequenceNode
+from ..inputs.yamltree import Mapping, Node, Sequence as SequenceNode, written
 from .structure import Sections
 
 DEFAULT_PROBE = "probe"

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Collection
-from collections.abc import Sequence as AnySequence
+from collections.abc import Collection, Sequence as AnySequence
 from dataclasses import replace
 from pathlib import Path
 

@@ -7,8 +7,7 @@ from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 
-from ..inputs.number_arrays import Array
-from ..inputs.number_arrays import Integers as Integers
+from ..inputs.number_arrays import Array, Integers as Integers
 
 Unit = Literal["m", "rad", "1", "K", "1/K", "m/h", "1/h"]
 

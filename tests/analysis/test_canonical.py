@@ -16,8 +16,7 @@ from ballplate.simulator.estimation.linearisation import Linearisation, linearis
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.quantities import LengthFunction, Target
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from numpy.typing import NDArray
 
 DESIGNS = Path(__file__).parents[2] / "designs"

@@ -15,8 +15,7 @@ from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from ballplate.uncertainty.summaries import Quantity, uncertainties
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from tests.reference.designs import (
     altered,

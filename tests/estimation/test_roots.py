@@ -11,8 +11,7 @@ from ballplate.simulator.computing.rounding import (
 )
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.linearisation import linearise
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from tests.reference.designs import grid_experiment
 

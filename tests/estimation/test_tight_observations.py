@@ -16,8 +16,7 @@ from ballplate.simulator.design.observations.distances import CalibratedDistance
 from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.uncertainty.summaries import point_pairs
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from numpy.typing import NDArray
 
 from tests.reference import dense

@@ -23,8 +23,7 @@ from ballplate.simulator.inputs.quantities import (
 from ballplate.simulator.inputs.quantity_types import Length, Ratio, TargetFunction
 from ballplate.simulator.inputs.quantity_words import format_length, typed_length
 from ballplate.simulator.inputs.units import LENGTH_UNITS
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from pydantic import TypeAdapter
 
 from tests.experiment import wording

@@ -13,8 +13,7 @@ from ballplate.simulator.inputs.yamltree import (
     resolve_scalar,
     to_python,
 )
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from tests.experiment import wording
 

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from ballplate.simulator.geometry.artefacts import AnyArtefactSettings
 from ballplate.simulator.geometry.ball_layouts import BallLayout, corners, pairs
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from pydantic import TypeAdapter
 
 from tests.geometry import wording

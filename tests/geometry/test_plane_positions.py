@@ -15,8 +15,7 @@ from ballplate.simulator.geometry.positions import (
     ball_coordinates,
     nominal_pose,
 )
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from tests.geometry import wording
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from ballplate.simulator.geometry.rotations import cosine_and_sine, rotation_matrix
 from ballplate.simulator.inputs.quantities import parse_angle
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 angles = st.floats(-10.0, 10.0)
 

@@ -13,8 +13,7 @@ from ballplate.simulator.machines.bases import (
     whole_values,
 )
 from ballplate.simulator.machines.basis_settings import SplineSettings
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from scipy.interpolate import BSpline
 from scipy.linalg import null_space
 

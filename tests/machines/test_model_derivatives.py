@@ -29,8 +29,7 @@ from ballplate.simulator.machines.terms import (
     tensor,
     univariate,
 )
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from tests.reference.derivatives import assert_derivative, complex_step
 

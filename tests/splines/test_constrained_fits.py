@@ -11,8 +11,7 @@ from ballplate.simulator.splines.polynomial_pieces import pieces
 from ballplate.simulator.splines.space import SplineSpace
 from ballplate.simulator.splines.spline_fit import fit
 from ballplate.simulator.splines.spline_problems import SplineError
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.interpolate import CubicSpline, make_lsq_spline
 
 from tests.reference import truncated_powers

@@ -8,8 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from ballplate.extensions.requirements.goals import Goal, check_goal, judge
-from ballplate.results import FEW, Fit, PlannedUncertainty, check
-from ballplate.results import fit as fit_observed
+from ballplate.results import FEW, Fit, PlannedUncertainty, check, fit as fit_observed
 from ballplate.simulator.computing import Report, counted, single_threaded, unreported
 from ballplate.simulator.estimation import Linearisation, linearise
 from ballplate.simulator.experiment import Experiment, Pool, Position, lay_out, placed_only

@@ -2,14 +2,6 @@
 length equations.
 """
 
-from __future__ import annotations
+import lazy_loader
 
-from typing import TYPE_CHECKING
-
-from ballplate.simulator.inputs import lazily
-
-# Public names of this package: other extensions import these alone.
-if TYPE_CHECKING:
-    from .distances import compare_estimators
-
-__getattr__, __dir__ = lazily(__name__, __file__)
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -10,8 +10,7 @@ from ballplate.results import Fit
 from ballplate.simulator.inputs import ensure_path, ensure_type
 
 from .fitted_map import FittedMap
-from .map_files import read_map
-from .map_files import write_map as write
+from .map_files import read_map, write_map as write
 
 
 def load_map(path: PathLike) -> FittedMap:

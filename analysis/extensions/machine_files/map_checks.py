@@ -10,8 +10,10 @@ from ballplate.simulator.design import Probes, Volume
 from ballplate.simulator.experiment import check_ends, check_installed
 from ballplate.simulator.inputs import (
     ExperimentError,
+    Mapping as MappingNode,
     Node,
     Problems,
+    Sequence as SequenceNode,
     Trust,
     describe,
     listing,
@@ -19,8 +21,6 @@ from ballplate.simulator.inputs import (
     to_python,
     validated,
 )
-from ballplate.simulator.inputs import Mapping as MappingNode
-from ballplate.simulator.inputs import Sequence as SequenceNode
 from ballplate.simulator.machines import (
     Array,
     CustomModelError,

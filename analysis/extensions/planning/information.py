@@ -31,8 +31,7 @@ from ballplate.simulator.design import (
     reading_weights,
     rotation_sensitivity,
 )
-from ballplate.simulator.estimation import ALIKE, EXACT, Collected, Triangle
-from ballplate.simulator.estimation import triangle as triangular
+from ballplate.simulator.estimation import ALIKE, EXACT, Collected, Triangle, triangle as triangular
 from ballplate.simulator.experiment import Candidate, Experiment, Position
 from ballplate.simulator.inputs import refused
 from ballplate.simulator.machines import Array

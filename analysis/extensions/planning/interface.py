@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 from ballplate.arguments import PathLike, experiment_of, table_of
 from ballplate.simulator.computing import Report, unreported
-from ballplate.simulator.experiment import Experiment, with_pool
-from ballplate.simulator.experiment import load as load_experiments
+from ballplate.simulator.experiment import Experiment, load as load_experiments, with_pool
 from ballplate.simulator.inputs import (
     ensure_one_of,
     ensure_positive,

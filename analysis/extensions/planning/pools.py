@@ -6,9 +6,7 @@ from __future__ import annotations
 
 import fnmatch
 from collections import Counter
-from collections.abc import Iterable
-from collections.abc import Mapping as AnyMapping
-from collections.abc import Sequence as AnySequence
+from collections.abc import Iterable, Mapping as AnyMapping, Sequence as AnySequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 

@@ -10,6 +10,7 @@ from ballplate.results import check
 from ballplate.simulator.experiment import Experiment, load, place_of
 from ballplate.simulator.inputs import (
     UNKNOWN,
+    Mapping as MappingNode,
     Node,
     Steps,
     Trust,
@@ -19,7 +20,6 @@ from ballplate.simulator.inputs import (
     to_python,
     written,
 )
-from ballplate.simulator.inputs import Mapping as MappingNode
 
 from .changes import changed
 from .repairs import Repair

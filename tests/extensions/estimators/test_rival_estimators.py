@@ -9,8 +9,7 @@ from typing import Any
 import ballplate as bp
 import numpy as np
 import pytest
-from ballplate import experiment as made_of
-from ballplate import fit, simulate
+from ballplate import experiment as made_of, fit, simulate
 from ballplate.cli import main
 from ballplate.extensions.estimators import distances
 from ballplate.extensions.estimators.alternative_estimators import AlternativeName

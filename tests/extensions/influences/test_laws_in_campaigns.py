@@ -21,9 +21,11 @@ from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.readings.simulated import simulated_readings
 from ballplate.uncertainty.quantities import QUANTITIES
 
-from tests.extensions.influences import test_drift as drift
-from tests.extensions.influences import test_sag as sag
-from tests.extensions.influences import test_temperature as temperature
+from tests.extensions.influences import (
+    test_drift as drift,
+    test_sag as sag,
+    test_temperature as temperature,
+)
 from tests.extensions.influences.campaigns import (
     Law,
     Real,

@@ -10,8 +10,7 @@ import pytest
 from ballplate.extensions.laboratory.any_table import TableRows
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.yamltree import GivenText
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
+from hypothesis import example, given, settings, strategies as st
 
 from tests.extensions.laboratory import wording
 from tests.extensions.laboratory.tables import rows_of

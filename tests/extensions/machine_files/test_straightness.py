@@ -10,8 +10,7 @@ import pytest
 # Loaded beforehand, so that the first example does not take longer than examples may.
 import scipy.optimize  # noqa: F401
 from ballplate.extensions.machine_files.straightness import reference_line
-from hypothesis import example, given
-from hypothesis import strategies as st
+from hypothesis import example, given, strategies as st
 
 points = st.integers(3, 9).flatmap(
     lambda n: st.tuples(

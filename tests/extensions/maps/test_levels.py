@@ -23,8 +23,7 @@ from ballplate.extensions.maps.shared_certificates import with_shared_certificat
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.grids import even_grid
 from ballplate.simulator.machines.protocol import Array
-from scipy.stats import beta, norm
-from scipy.stats import t as student
+from scipy.stats import beta, norm, t as student
 
 from tests.extensions.maps.campaigns import simulated_map
 

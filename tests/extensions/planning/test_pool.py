@@ -14,8 +14,7 @@ from ballplate.simulator.experiment.pool import placed_only
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.quantities import parse_length
 from ballplate.simulator.inputs.quantity_words import length_text
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from tests.experiment import wording
 

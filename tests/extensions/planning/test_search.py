@@ -21,8 +21,7 @@ from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import AtMost, Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.protocol import Array
-from hypothesis import HealthCheck, Phase, given, settings
-from hypothesis import strategies as st
+from hypothesis import HealthCheck, Phase, given, settings, strategies as st
 
 from tests.extensions.planning import wording
 

@@ -9,8 +9,7 @@ from typing import Any
 import pytest
 from ballplate.extensions.repair.yamltext import TextChange, with_changes
 from ballplate.simulator.inputs.messages import ExperimentError
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from tests.extensions.repair import wording
 from tests.reference.yaml_styles import COMMENTS, Writer, lines_ended, plain

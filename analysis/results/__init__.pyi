@@ -1,0 +1,52 @@
+# Public names of this package, each loaded from its module when it is first used.
+from .adjustments import (
+    FEW as FEW,
+    Adjustment as Adjustment,
+    adjusted as adjusted,
+    few_degrees_of_freedom as few_degrees_of_freedom,
+    freedom_words as freedom_words,
+)
+from .checked_designs import (
+    PlannedUncertainty as PlannedUncertainty,
+    check as check,
+    planned_uncertainty as planned_uncertainty,
+    predict as predict,
+)
+from .checked_files import (
+    CheckedDesign as CheckedDesign,
+    CheckedFile as CheckedFile,
+    Wanted as Wanted,
+    advised as advised,
+    check_files as check_files,
+    checked_design as checked_design,
+)
+from .diagnosis import has_exact_values as has_exact_values
+from .error_functions import estimated_curves as estimated_curves
+from .estimates import (
+    ESTIMATE_COLUMNS as ESTIMATE_COLUMNS,
+    ParameterEstimate as ParameterEstimate,
+    labels as labels,
+)
+from .estimator_choice import COMPARED as COMPARED, EstimatorName as EstimatorName
+from .fits import Fit as Fit
+from .fitting import fit as fit
+from .plates import axes_of_plates as axes_of_plates
+from .prediction import Prediction as Prediction
+from .qualifications import (
+    Qualification as Qualification,
+    given_words as given_words,
+    of_pool as of_pool,
+    qualification_data as qualification_data,
+    qualifications_of as qualifications_of,
+)
+from .residuals import reading_residuals as reading_residuals
+from .text_blocks import (
+    MOST_BALLS as MOST_BALLS,
+    adjustment_data as adjustment_data,
+    adjustment_lines as adjustment_lines,
+    coordinates_data as coordinates_data,
+    iteration_lines as iteration_lines,
+    scale_lines as scale_lines,
+    target_lines as target_lines,
+    verdict_lines as verdict_lines,
+)

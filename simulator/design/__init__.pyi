@@ -1,0 +1,96 @@
+# Public names of this package, each loaded from its module when it is first used.
+from .arrays import (
+    Design as Design,
+    Observations as Observations,
+    Readings as Readings,
+    Rows as Rows,
+    State as State,
+    disturbed_readings as disturbed_readings,
+    locations as locations,
+    measured as measured,
+    nominal_places as nominal_places,
+    nominal_state as nominal_state,
+    read_in_positions as read_in_positions,
+    reading_noise as reading_noise,
+    reading_uncertainties as reading_uncertainties,
+)
+from .influences.protocol import (
+    DesignParts as DesignParts,
+    Disturbed as Disturbed,
+    Influence as Influence,
+    InfluenceParameter as InfluenceParameter,
+    InfluenceSettings as InfluenceSettings,
+    or_unknown as or_unknown,
+)
+from .lookup import (
+    Indices as Indices,
+    References as References,
+    lengths_per_axis as lengths_per_axis,
+)
+from .objects import (
+    SLIGHTLY as SLIGHTLY,
+    Flags as Flags,
+    Machine as Machine,
+    Probes as Probes,
+    Tasks as Tasks,
+    Volume as Volume,
+)
+from .observations.balls import BallFunctions as BallFunctions, BallObservations as BallObservations
+from .observations.calibration import (
+    FAR_FROM_DRAWING as FAR_FROM_DRAWING,
+    MOST_TIED_BALLS as MOST_TIED_BALLS,
+    Calibration as Calibration,
+    CertifiedValue as CertifiedValue,
+    far_from_drawing as far_from_drawing,
+)
+from .observations.certificate_tables import read_rows as read_rows
+from .observations.coordinates import (
+    CalibratedBalls as CalibratedBalls,
+    CalibratedCoordinates as CalibratedCoordinates,
+    CoordinateCalibration as CoordinateCalibration,
+)
+from .observations.distances import (
+    CalibratedDistances as CalibratedDistances,
+    DistanceCalibration as DistanceCalibration,
+)
+from .observations.joint_lengths import equation_root as equation_root
+from .observations.joint_values import JointValues as JointValues
+from .observations.kinds import is_of_machine as is_of_machine
+from .observations.lengths import (
+    Lengths as Lengths,
+    length_derivative as length_derivative,
+    length_deviations as length_deviations,
+    length_directions as length_directions,
+    length_name as length_name,
+    length_values as length_values,
+    length_whitening as length_whitening,
+)
+from .observations.priors import Priors as Priors
+from .observations.radius import RadiusCalibration as RadiusCalibration
+from .observations.readings import (
+    expected_readings as expected_readings,
+    offset_sensitivity as offset_sensitivity,
+    reading_blocks as reading_blocks,
+    reading_weights as reading_weights,
+    rotation_sensitivity as rotation_sensitivity,
+    seen_places as seen_places,
+)
+from .observations.star import Stars as Stars
+from .observations.stated_values import (
+    CertificateEntry as CertificateEntry,
+    CertificateSettings as CertificateSettings,
+    FileValues as FileValues,
+    check_keys as check_keys,
+    is_digital as is_digital,
+    read_digital as read_digital,
+    uncertainties_of as uncertainties_of,
+    value_name as value_name,
+)
+from .observations.whitening import (
+    EXACT as EXACT,
+    CovarianceRoot as CovarianceRoot,
+    Whitening as Whitening,
+    at_least_exact as at_least_exact,
+    covariance_root as covariance_root,
+)
+from .parameters import SharedLayout as SharedLayout, shared_layout as shared_layout

@@ -1,0 +1,79 @@
+# Public names of this package, each loaded from its module when it is first used.
+from .bounds import (
+    EDGE as EDGE,
+    OUTSIDE as OUTSIDE,
+    TOLERANCE as TOLERANCE,
+    Bounds as Bounds,
+    edge_of as edge_of,
+    entered as entered,
+    limits_of as limits_of,
+    occupied as occupied,
+    shared as shared,
+)
+from .calibrations import resolve_calibration as resolve_calibration
+from .changes import node_of as node_of
+from .inside_checks import check_inside as check_inside
+from .json_schema import DRAFT as DRAFT, schema as schema, tidied as tidied
+from .layout import lay_out as lay_out
+from .loading import build as build, load as load, trees_of as trees_of, with_pool as with_pool
+from .model import (
+    AtMost as AtMost,
+    Candidate as Candidate,
+    ChangeTimes as ChangeTimes,
+    Experiment as Experiment,
+    Pool as Pool,
+    Position as Position,
+    Prior as Prior,
+    Probe as Probe,
+    ReadingGroup as ReadingGroup,
+)
+from .modules import python_models as python_models, runs_code as runs_code
+from .name_rules import PLACE as PLACE, check_rule as check_rule
+from .named_files import (
+    existing_file as existing_file,
+    files_of_machine as files_of_machine,
+    is_rooted as is_rooted,
+    keyed_paths as keyed_paths,
+    model_modules as model_modules,
+    module_files as module_files,
+    named_in as named_in,
+)
+from .own_sections import check_installed as check_installed
+from .placements import check_turns as check_turns, resolve_position as resolve_position
+from .pool import placed_only as placed_only, with_chosen as with_chosen
+from .pool_sections import (
+    GroupSettings as GroupSettings,
+    LimitsSettings as LimitsSettings,
+    ListedSettings as ListedSettings,
+    OwnTimesSettings as OwnTimesSettings,
+    PlacesByAxis as PlacesByAxis,
+    PoolSettings as PoolSettings,
+    RangeSettings as RangeSettings,
+    SelectorSettings as SelectorSettings,
+    TimesSettings as TimesSettings,
+    is_group as is_group,
+)
+from .position_sections import Edges as Edges
+from .readings_section import (
+    ColumnsSettings as ColumnsSettings,
+    CompensationSettings as CompensationSettings,
+    Coordinate as Coordinate,
+    ReadingsSettings as ReadingsSettings,
+)
+from .sections import (
+    Line as Line,
+    MapPriorSettings as MapPriorSettings,
+    Seed as Seed,
+    VolumeSettings as VolumeSettings,
+)
+from .size_checks import check_lengths as check_lengths
+from .spans import unspanned as unspanned
+from .structure import Sections as Sections
+from .variants import (
+    is_same_place as is_same_place,
+    node_at as node_at,
+    override as override,
+    place_of as place_of,
+    variant_trees as variant_trees,
+)
+from .volumes import check_ends as check_ends

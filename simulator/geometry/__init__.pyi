@@ -1,0 +1,45 @@
+# Public names of this package, each loaded from its module when it is first used.
+from .artefacts import (
+    BryanGaugeSettings as BryanGaugeSettings,
+    GridSettings as GridSettings,
+    SquareSettings as SquareSettings,
+    TwoSpheresSettings as TwoSpheresSettings,
+)
+from .axes import (
+    PlateAxes as PlateAxes,
+    axes_words as axes_words,
+    in_plate_axes as in_plate_axes,
+    plate_axes as plate_axes,
+)
+from .ball_layouts import (
+    ArtefactSettings as ArtefactSettings,
+    BallLayout as BallLayout,
+    Name as Name,
+    frozen as frozen,
+    pairs as pairs,
+)
+from .grids import even_grid as even_grid
+from .motions import (
+    AXIS_NAMES as AXIS_NAMES,
+    cross_matrices as cross_matrices,
+    fit_motion as fit_motion,
+    fixes_pose as fixes_pose,
+    pose_size as pose_size,
+    rigid_motions as rigid_motions,
+    rotation_from_vector as rotation_from_vector,
+    vector_from_rotation as vector_from_rotation,
+    without_rigid_motion as without_rigid_motion,
+)
+from .positions import (
+    AXIS_INDEX as AXIS_INDEX,
+    IN_PLANE_AXES as IN_PLANE_AXES,
+    QUARTER_TURNS as QUARTER_TURNS,
+    Axis as Axis,
+    PlanePlacement as PlanePlacement,
+    Pose as Pose,
+    ball_coordinates as ball_coordinates,
+    corners as corners,
+    nominal_pose as nominal_pose,
+    plane_rotation as plane_rotation,
+)
+from .rotations import rotation_matrix as rotation_matrix

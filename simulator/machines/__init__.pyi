@@ -1,0 +1,62 @@
+# Public names of this package, each loaded from its module when it is first used.
+from .arrangement import ARRANGEMENTS as ARRANGEMENTS, AXES as AXES, Arrangement as Arrangement
+from .arrangement_settings import (
+    ARRANGEMENT as ARRANGEMENT,
+    PRODUCTS as PRODUCTS,
+    ArrangementName as ArrangementName,
+    ArrangementSettings as ArrangementSettings,
+    arrangement_of as arrangement_of,
+)
+from .bases import (
+    Basis as Basis,
+    Polynomial as Polynomial,
+    SingleFunction as SingleFunction,
+    Spline as Spline,
+)
+from .empirical_settings import EmpiricalSettings as EmpiricalSettings
+from .error_names import (
+    AXIS_ERRORS as AXIS_ERRORS,
+    ERRORS as ERRORS,
+    ROTATIONS as ROTATIONS,
+    SQUARENESS_ERRORS as SQUARENESS_ERRORS,
+    TRANSLATIONS as TRANSLATIONS,
+    AxisError as AxisError,
+    SquarenessError as SquarenessError,
+)
+from .kinematic import (
+    ErrorFunction as ErrorFunction,
+    KinematicModel as KinematicModel,
+    carried_vectors as carried_vectors,
+    error_function as error_function,
+)
+from .kinematic_settings import KinematicSettings as KinematicSettings
+from .metric import MetricModel as MetricModel, Scale as Scale
+from .model_kinds import (
+    Corner as Corner,
+    CustomModelError as CustomModelError,
+    ErrorModelKind as ErrorModelKind,
+)
+from .plane import PlaneModel as PlaneModel, in_space as in_space
+from .protocol import (
+    Array as Array,
+    ErrorModel as ErrorModel,
+    HasLines as HasLines,
+    Integers as Integers,
+    Line as Line,
+    Parameter as Parameter,
+    Reported as Reported,
+    TrueMachine as TrueMachine,
+    Unit as Unit,
+)
+from .settings import (
+    KINDS as KINDS,
+    ErrorModelSettings as ErrorModelSettings,
+    MetricSettings as MetricSettings,
+    build_error_model as build_error_model,
+    kind_of as kind_of,
+)
+from .spatial_metric import (
+    SpatialMetricModel as SpatialMetricModel,
+    parameters_of_metric as parameters_of_metric,
+)
+from .true_machine_settings import FurtherTrueMachine as FurtherTrueMachine
