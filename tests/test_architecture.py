@@ -145,6 +145,18 @@ def test_rooms_import_only_rooms_below() -> None:
     assert not upward
 
 
+def test_imports_within_a_room_are_relative_and_between_rooms_absolute() -> None:
+    for path in kernel():
+        here = room_of(path)
+        for node in ast.walk(trees()[path]) if here else ():
+            if not isinstance(node, ast.ImportFrom) or not f"{node.module}".startswith("ballplate"):
+                # As many dots as lead out of the room.
+                assert getattr(node, "level", 0) <= len(path.parts) - 2, (path, node.lineno)
+            else:
+                room = f"{PACKAGES[path.parts[0]]}.{path.parts[1]}"
+                assert not f"{node.module}.".startswith(f"{room}."), (path, node.lineno)
+
+
 def test_there_are_few_rooms_and_all_are_in_order() -> None:
     found = {room_of(path) for path in kernel()} - {None}
     assert found == set(ROOMS)

@@ -15,7 +15,7 @@ from .notes import note, note_singular_values, tell_notes, warn
 from .outputs import UsageError
 
 if TYPE_CHECKING:
-    from ..results.checked_files import CheckedFile
+    from ballplate.results.checked_files import CheckedFile
 
 AS_EXPECTED, NOT_AS_EXPECTED, BAD_FILE = 0, 1, 3
 
@@ -93,7 +93,8 @@ def add_options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Check all designs; return 1 unless all are as expected, 3 if a file cannot be used."""
-    from ..results.checked_files import Wanted, check_files
+    from ballplate.results.checked_files import Wanted, check_files
+
     from .common import print_json
     from .file_patterns import matching_files
     from .progress_bars import progress

@@ -17,9 +17,8 @@ from .notes import note, tell_notes, warn
 from .outputs import PICTURE, Contents, UsageError, Writer, add_output, write
 
 if TYPE_CHECKING:
+    from ballplate.presentation.result import Result
     from ballplate.simulator.experiment.model import Experiment
-
-    from ..presentation.result import Result
 
 
 def add_file(parser: ArgumentParser, several: bool = False, needed: bool = True) -> None:
@@ -111,7 +110,7 @@ def at_most(number: int, most: int, noun: str) -> int:
 
 def trial_count(text: str) -> int:
     """Read a number of synthetic data sets from the command line."""
-    from ..montecarlo.trial_runs import MOST_TRIALS
+    from ballplate.montecarlo.trial_runs import MOST_TRIALS
 
     return at_most(count(text), MOST_TRIALS, "data sets")
 
@@ -193,7 +192,7 @@ def add_picture(parser: Any, name: str, help: str) -> None:
 
 
 def _picture(text: str) -> Path:
-    from ..presentation.svg import PICTURES
+    from ballplate.presentation.svg import PICTURES
 
     if Path(text).suffix.lower() not in PICTURES:
         raise ArgumentTypeError(f'a picture\'s name ends in {", ".join(PICTURES)}, unlike "{text}"')

@@ -6,15 +6,15 @@ from argparse import ArgumentParser, Namespace
 from functools import partial
 from pathlib import Path
 
-from ballplate.simulator.inputs.extensions import service
-
-from ..results.estimator_choice import (
+from ballplate.results.estimator_choice import (
     DRAWN,
     ESTIMATORS,
     TAKE,
     fit_readings,
     takers,
 )
+from ballplate.simulator.inputs.extensions import service
+
 from .common import (
     add_json,
     add_page,
@@ -97,7 +97,8 @@ def _add_estimators(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Fit one experiment; 1 if there is something to complain of."""
-    from ..results.fits import Fit
+    from ballplate.results.fits import Fit
+
     from .common import show
 
     _refuse_misused(options)

@@ -69,8 +69,9 @@ def told(options: Namespace) -> Iterator[None]:
     if not options.verbose:
         yield
         return
-    from ballplate.cli.outputs import inputs
     from ballplate.simulator.computing.library_versions import versions
+
+    from .outputs import inputs
 
     for name, version in versions():
         note(options, f"{name} {version}")

@@ -15,10 +15,9 @@ from .table_options import add_tables, named_sources, with_options
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from ballplate.presentation.result import FitResult
     from ballplate.simulator.experiment.model import Experiment
     from ballplate.simulator.readings.observed_readings import ObservedReadings
-
-    from ..presentation.result import FitResult
 
 
 # Of a command that fits readings in any case.

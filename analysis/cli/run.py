@@ -13,11 +13,10 @@ from .notes import complain, note_singular_values
 from .outputs import UsageError, add_force, write
 
 if TYPE_CHECKING:
+    from ballplate.montecarlo.experiments import Trials
+    from ballplate.results.prediction import Prediction
     from ballplate.simulator.computing.steps import ProgressStep
     from ballplate.simulator.experiment.model import Experiment
-
-    from ..montecarlo.experiments import Trials
-    from ..results.prediction import Prediction
 
 
 DESCRIPTION = (
@@ -64,7 +63,8 @@ def _trial_count(text: str) -> int:
 
 def run(options: Namespace) -> int:
     """Plan all experiments of the files; 1 if the rank of one is not as expected."""
-    from ..results.checked_designs import predict
+    from ballplate.results.checked_designs import predict
+
     from .common import experiments, print_json, print_lines
 
     plans, results, interrupted = [], [], False
@@ -90,7 +90,7 @@ def run(options: Namespace) -> int:
                 print_lines(["", *(none if assumed is None else assumed.lines())])
         data: Data = plans[-1].to_dict()
         if with_trials:
-            from ..montecarlo.comparison_tables import trials_data, trials_lines
+            from ballplate.montecarlo.comparison_tables import trials_data, trials_lines
 
             trials_done = _trials(experiment, options)
             data["monte_carlo"] = trials_data(trials_done)
@@ -119,10 +119,10 @@ def _write_page(options: Namespace, prediction: Prediction) -> None:
 
 
 def _trials(experiment: Experiment, options: Namespace) -> Trials:
+    from ballplate.montecarlo.experiments import trials
+    from ballplate.montecarlo.trial_runs import MOST_TRIALS
     from ballplate.simulator.computing.processes import processors
 
-    from ..montecarlo.experiments import trials
-    from ..montecarlo.trial_runs import MOST_TRIALS
     from .progress_bars import progress
 
     with progress(options) as shown:

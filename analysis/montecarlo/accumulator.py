@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from operator import add
 
 import numpy as np
-from ballplate.montecarlo.reference import Reference
-from ballplate.montecarlo.replicates import Estimates
 from ballplate.simulator.machines.protocol import Array
 
+from .reference import Reference
+from .replicates import Estimates
 from .targets import MonteCarloQuantity
 
 # Coverage probability of expanded uncertainties.

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 
-from ballplate.presentation.formatting import Data
+from ballplate.presentation.formatting import Data, aligned, number, picked, shown_unit
 from ballplate.simulator.inputs.settings import listing
+from ballplate.uncertainty.quantities import QUANTITIES
 
-from ..presentation.formatting import aligned, number, picked, shown_unit
-from ..uncertainty.quantities import QUANTITIES
 from .experiments import Trials
 from .figures import BEYOND, MonteCarloComparison, MonteCarloEstimate, MonteCarloOutcome
 

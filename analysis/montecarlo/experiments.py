@@ -7,12 +7,6 @@ from functools import reduce
 from operator import add
 
 import numpy as np
-from ballplate.montecarlo.reference import (
-    DivergedError,
-    Reference,
-    Truth,
-    reference,
-)
 from ballplate.simulator.computing.steps import Report, unreported
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.priors import Priors
@@ -25,6 +19,12 @@ from ballplate.simulator.readings.simulated import on_stated_machine
 
 from .accumulator import Accumulator
 from .figures import MonteCarloOutcome, outcome, power_of_misfit
+from .reference import (
+    DivergedError,
+    Reference,
+    Truth,
+    reference,
+)
 from .targets import targets
 from .trial_runs import TASK, run_trials, sum_of_task
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.montecarlo.reference import Reference
 
 from .accumulator import (
     ACTUAL,
@@ -18,6 +17,7 @@ from .accumulator import (
     QuantityAccumulator,
     factors,
 )
+from .reference import Reference
 from .targets import MonteCarloQuantity
 
 # Standard errors beyond which a difference is significant; false in one of some hundred runs with

@@ -7,8 +7,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from ballplate.montecarlo.reference import Reference
-from ballplate.montecarlo.replicates import Deviations
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.estimation.functions import (
@@ -24,9 +22,11 @@ from ballplate.simulator.estimation.functions import (
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.geometry.motions import vector_from_rotation
 from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.uncertainty.pairs import pairs_of
+from ballplate.uncertainty.quantities import QUANTITIES, functions_of
 
-from ..uncertainty.pairs import pairs_of
-from ..uncertainty.quantities import QUANTITIES, functions_of
+from .reference import Reference
+from .replicates import Deviations
 
 # Distances followed through all replicates; more are sampled.
 MOST_PAIRS = 1000

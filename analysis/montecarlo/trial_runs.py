@@ -6,14 +6,15 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from ballplate.montecarlo.accumulator import Accumulator, accumulate
-from ballplate.montecarlo.figures import MonteCarloOutcome, outcome
-from ballplate.montecarlo.reference import Reference
-from ballplate.montecarlo.replicates import BATCH, estimate_batch
-from ballplate.montecarlo.targets import MonteCarloQuantity, targets
 from ballplate.simulator.computing.processes import in_processes
 from ballplate.simulator.computing.steps import ProgressStep, Report, unreported
 from ballplate.simulator.computing.threads import single_threaded
+
+from .accumulator import Accumulator, accumulate
+from .figures import MonteCarloOutcome, outcome
+from .reference import Reference
+from .replicates import BATCH, estimate_batch
+from .targets import MonteCarloQuantity, targets
 
 # Batches of a task: constant, so that the order of sums is independent of the workers.
 BATCHES = 4

@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from ballplate.rank.canonical import elementary_mixture, principal_directions
 from ballplate.simulator.computing.rounding import above
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.parameters import SharedLayout
@@ -18,6 +17,7 @@ from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.inputs.quantities import Target
 from ballplate.simulator.machines.protocol import Array
 
+from .canonical import elementary_mixture, principal_directions
 from .descriptions import described, largest_displacement, signed
 from .directions import Direction
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ballplate.rank.verdicts import verdict
-from ballplate.results.influences import influence_uncertainties
-from ballplate.results.prediction import Prediction
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.linearisation import linearise
@@ -14,6 +12,9 @@ from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.uncertainty.summaries import Quantity, tasks_of, uncertainties
 from ballplate.uncertainty.tasks import TaskUncertainty
+
+from .influences import influence_uncertainties
+from .prediction import Prediction
 
 
 @dataclass(frozen=True)

@@ -12,10 +12,9 @@ from ballplate.simulator.inputs.extensions import service
 from ballplate.simulator.inputs.messages import refused
 
 if TYPE_CHECKING:
+    from ballplate.presentation.result import FitResult
     from ballplate.simulator.experiment.model import Experiment
     from ballplate.simulator.readings.observed_readings import ObservedReadings
-
-    from ..presentation.result import FitResult
 
 EstimatorName = Literal[
     "full", "distances", "cresto", "kruth", "reversal", "length-equations", "sphere-then-metric"

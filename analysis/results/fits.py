@@ -15,10 +15,23 @@ from ballplate.presentation.scenes import box_edges, projection
 from ballplate.presentation.table_columns import MainTable, table_lines
 from ballplate.presentation.vectors import Vectors, draw_vectors
 from ballplate.rank.verdicts import Verdict
-from ballplate.results.adjustments import Adjustment, few_degrees_of_freedom, freedom_words
-from ballplate.results.diagnosis import Suspicion, has_exact_values, lack_of_fit
-from ballplate.results.error_functions import EstimatedCurve, estimated_curves
-from ballplate.results.estimates import (
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.estimation.gauss_newton import Solution
+from ballplate.simulator.inputs.arguments import ensure_positive, ensure_type
+from ballplate.simulator.inputs.extensions import function, service
+from ballplate.simulator.inputs.settings import listing
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.maps.fit_verdict import LackOfFit
+from ballplate.simulator.maps.map_prior import LEAST_SIGMA
+from ballplate.simulator.readings.given_points import ensure_points, probe_places
+from ballplate.simulator.readings.observed_readings import ObservedReadings
+from ballplate.uncertainty.summaries import Quantity, tasks_of
+from ballplate.uncertainty.tasks import TaskUncertainty
+
+from .adjustments import Adjustment, few_degrees_of_freedom, freedom_words
+from .diagnosis import Suspicion, has_exact_values, lack_of_fit
+from .error_functions import EstimatedCurve, estimated_curves
+from .estimates import (
     ESTIMATE_COLUMNS,
     CorrectedPoints,
     EstimatedFunctions,
@@ -26,14 +39,14 @@ from ballplate.results.estimates import (
     correct,
     labels,
 )
-from ballplate.results.extension_results import (
+from .extension_results import (
     IssuedCertificate,
     SeparateSigmas,
 )
-from ballplate.results.plates import PlateCoordinates
-from ballplate.results.prediction import by_label, length_headline, rank_words
-from ballplate.results.residuals import Residual, reading_residuals, residual_groups
-from ballplate.results.text_blocks import (
+from .plates import PlateCoordinates
+from .prediction import by_label, length_headline, rank_words
+from .residuals import Residual, reading_residuals, residual_groups
+from .text_blocks import (
     adjustment_data,
     adjustment_lines,
     iteration_lines,
@@ -48,18 +61,6 @@ from ballplate.results.text_blocks import (
     verdict_data,
     verdict_lines,
 )
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.estimation.gauss_newton import Solution
-from ballplate.simulator.inputs.arguments import ensure_positive, ensure_type
-from ballplate.simulator.inputs.extensions import function, service
-from ballplate.simulator.inputs.settings import listing
-from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.maps.fit_verdict import LackOfFit
-from ballplate.simulator.maps.map_prior import LEAST_SIGMA
-from ballplate.simulator.readings.given_points import ensure_points, probe_places
-from ballplate.simulator.readings.observed_readings import ObservedReadings
-from ballplate.uncertainty.summaries import Quantity, tasks_of
-from ballplate.uncertainty.tasks import TaskUncertainty
 
 if TYPE_CHECKING:
     import pandas

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
+from ballplate.rank.verdicts import verdict
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.estimation.linearisation import Linearisation
@@ -15,9 +16,8 @@ from ballplate.simulator.machines.kinematic import KinematicModel
 from ballplate.simulator.machines.plane import PlaneModel
 from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
 from ballplate.simulator.readings.observed_readings import ObservedReadings
+from ballplate.uncertainty.summaries import uncertainties
 
-from ..rank.verdicts import verdict
-from ..uncertainty.summaries import uncertainties
 from .adjustments import Adjustment, adjusted
 from .checked_designs import check
 from .diagnosis import diagnosed

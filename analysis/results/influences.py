@@ -8,10 +8,9 @@ from typing import Any
 
 import numpy as np
 from ballplate.presentation.formatting import Data
+from ballplate.presentation.table_columns import table_lines
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.machines.protocol import Unit
-
-from ..presentation.table_columns import table_lines
 
 # Rows of a table; displacements of single readings may be thousands.
 MOST_LINES = 30

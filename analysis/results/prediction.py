@@ -9,20 +9,19 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from ballplate.presentation.formatting import Data
+from ballplate.presentation.formatting import Data, given
+from ballplate.presentation.result import Result
+from ballplate.presentation.table_columns import MainTable
+from ballplate.rank.verdicts import Verdict
 from ballplate.simulator.computing.threads import single_threaded
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.inputs.extensions import optional_service, service
 from ballplate.simulator.inputs.settings import hint, number_of
+from ballplate.uncertainty.scale import Scale, scale_of
+from ballplate.uncertainty.summaries import Quantity, tasks_of
+from ballplate.uncertainty.tasks import TaskUncertainty
 
-from ..presentation.formatting import given
-from ..presentation.result import Result
-from ..presentation.table_columns import MainTable
-from ..rank.verdicts import Verdict
-from ..uncertainty.scale import Scale, scale_of
-from ..uncertainty.summaries import Quantity, tasks_of
-from ..uncertainty.tasks import TaskUncertainty
 from .extension_results import PredictedAssumptions
 from .influences import InfluenceUncertainty, influence_data, influence_table
 from .qualifications import (
@@ -48,10 +47,9 @@ from .text_blocks import (
 
 if TYPE_CHECKING:
     import pandas
+    from ballplate.montecarlo.experiments import Trials
     from ballplate.simulator.experiment.model import Experiment
     from matplotlib.figure import Figure
-
-    from ..montecarlo.experiments import Trials
 
 
 @dataclass(frozen=True)
@@ -141,7 +139,7 @@ class Prediction(Result):
         lines = [*self.table_lines(), *(() if self.advice is None else self.advice.lines)]
         if self.monte_carlo is None:
             return lines
-        from ..montecarlo.comparison_tables import trials_lines
+        from ballplate.montecarlo.comparison_tables import trials_lines
 
         return [*lines, "", *trials_lines(self.monte_carlo)]
 
@@ -179,7 +177,7 @@ class Prediction(Result):
         }
         if self.monte_carlo is None:
             return data
-        from ..montecarlo.comparison_tables import trials_data
+        from ballplate.montecarlo.comparison_tables import trials_data
 
         return data | {"monte_carlo": trials_data(self.monte_carlo)}
 
@@ -201,7 +199,7 @@ class Prediction(Result):
         :raises ImportError: matplotlib is missing.
         :raises ValueError: another suffix.
         """
-        from ..presentation.pictures import draw_design
+        from ballplate.presentation.pictures import draw_design
 
         names = ", ".join(self.design.positions.names)
         return draw_design(self.design, f"{self.title}: positions {names} in the volume", path)

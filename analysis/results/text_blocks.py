@@ -19,14 +19,15 @@ from ballplate.presentation.formatting import (
 )
 from ballplate.presentation.table_columns import table_lines
 from ballplate.rank.verdicts import GREAT, Verdict
-from ballplate.results.adjustments import ARCSECOND, Adjustment
-from ballplate.results.plates import PlateCoordinates
 from ballplate.simulator.computing.rounding import printable
 from ballplate.simulator.inputs.settings import listing, number_of
 from ballplate.simulator.machines.protocol import Array
 from ballplate.uncertainty.scale import Scale
 from ballplate.uncertainty.summaries import Quantity
 from ballplate.uncertainty.tasks import TaskUncertainty, is_determined
+
+from .adjustments import ARCSECOND, Adjustment
+from .plates import PlateCoordinates
 
 if TYPE_CHECKING:
     from ballplate.simulator.estimation.gauss_newton import Iteration

@@ -11,8 +11,8 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from ballplate.simulator.inputs.number_arrays import Array
 
-from ..inputs.number_arrays import Array
 from .threads import scipy_linalg
 
 

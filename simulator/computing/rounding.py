@@ -8,9 +8,8 @@ before they are compared, sorted or chosen from; of equal ones the first is take
 from __future__ import annotations
 
 import numpy as np
+from ballplate.simulator.inputs.number_arrays import Array, Flags, Integers
 from numpy.typing import ArrayLike
-
-from ..inputs.number_arrays import Array, Flags, Integers
 
 # Binary digits in which numbers have to agree, about six decimal ones.
 DIGITS = 20

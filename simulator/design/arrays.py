@@ -13,10 +13,10 @@ from pathlib import Path
 from typing import Any, ClassVar, Self, TypeVar, cast
 
 import numpy as np
+from ballplate.simulator.inputs.own_code import error_text, own_frame
+from ballplate.simulator.inputs.unusable import UnusableError
+from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers, Unit
 
-from ..inputs.own_code import error_text, own_frame
-from ..inputs.unusable import UnusableError
-from ..machines.protocol import Array, ErrorModel, Integers, Unit
 from .influences.protocol import DesignParts, Disturbed, Influence, InfluenceParameter
 from .noise import Noise
 from .objects import (

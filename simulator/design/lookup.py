@@ -9,15 +9,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from ballplate.simulator.geometry.ball_layouts import ArtefactSettings, BallLayout, corners, frozen
+from ballplate.simulator.inputs.messages import Step, Steps
+from ballplate.simulator.inputs.number_arrays import Array
+from ballplate.simulator.inputs.problems import Problems, written_text
+from ballplate.simulator.inputs.settings import hint, listing, shorten
+from ballplate.simulator.inputs.trust import UNKNOWN, Trust
+from ballplate.simulator.inputs.yamltree import Sequence as SequenceNode, written
 from numpy.typing import NDArray
 
-from ..geometry.ball_layouts import ArtefactSettings, BallLayout, corners, frozen
-from ..inputs.messages import Step, Steps
-from ..inputs.number_arrays import Array
-from ..inputs.problems import Problems, written_text
-from ..inputs.settings import hint, listing, shorten
-from ..inputs.trust import UNKNOWN, Trust
-from ..inputs.yamltree import Sequence as SequenceNode, written
 from .objects import Volume
 
 Indices = NDArray[np.intp]

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from ballplate.simulator.inputs.settings import Settings
+from ballplate.simulator.machines.protocol import Array, Integers
 from pydantic import Field
-
-from ..inputs.settings import Settings
-from ..machines.protocol import Array, Integers
 
 Distribution = Literal["normal", "uniform", "student t"]
 

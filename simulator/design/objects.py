@@ -8,10 +8,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-
-from ..inputs.number_arrays import Flags
-from ..inputs.quantities import Target
-from ..machines.protocol import Array, Integers
+from ballplate.simulator.inputs.number_arrays import Flags
+from ballplate.simulator.inputs.quantities import Target
+from ballplate.simulator.machines.protocol import Array, Integers
 
 # Fraction of the volume by which scale readings may be outside: measured offsets of probes are no
 # round numbers, and artefacts are not set up just as drawn.

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from ballplate.simulator.geometry.motions import AXIS_NAMES, pose_parameter_names, pose_size
+from ballplate.simulator.machines.protocol import Array, Integers, Parameter
 
-from ..geometry.motions import AXIS_NAMES, pose_parameter_names, pose_size
-from ..machines.protocol import Array, Integers, Parameter
 from .arrays import Design
 
 

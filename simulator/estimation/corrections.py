@@ -5,11 +5,10 @@ tasks.
 from __future__ import annotations
 
 import numpy as np
-
-from ..design.arrays import Design, State
-from ..design.observations.readings import offset_sensitivity
-from ..design.parameters import SharedLayout
-from ..machines.protocol import Array, Integers
+from ballplate.simulator.design.arrays import Design, State
+from ballplate.simulator.design.observations.readings import offset_sensitivity
+from ballplate.simulator.design.parameters import SharedLayout
+from ballplate.simulator.machines.protocol import Array, Integers
 
 
 def corrected_points(design: Design, state: State, points: Array, probes: Integers) -> Array:

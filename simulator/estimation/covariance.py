@@ -10,12 +10,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from ballplate.simulator.computing.decompositions import svd
+from ballplate.simulator.computing.threads import scipy_linalg, single_threaded
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.parameters import SharedLayout
+from ballplate.simulator.machines.protocol import Array
 
-from ..computing.decompositions import svd
-from ..computing.threads import scipy_linalg, single_threaded
-from ..design.arrays import Design
-from ..design.parameters import SharedLayout
-from ..machines.protocol import Array
 from .elimination import Factor
 from .graded import triangle
 from .substitution import in_order, solve_balls, solve_kept

@@ -20,12 +20,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
+from ballplate.simulator.computing.threads import scipy_linalg, single_threaded
+from ballplate.simulator.design.arrays import Design, Rows, State, ensure_rows
+from ballplate.simulator.design.observations.readings import reading_blocks, reading_weights
+from ballplate.simulator.design.parameters import SharedLayout
+from ballplate.simulator.machines.protocol import Array, Integers
 
-from ..computing.threads import scipy_linalg, single_threaded
-from ..design.arrays import Design, Rows, State, ensure_rows
-from ..design.observations.readings import reading_blocks, reading_weights
-from ..design.parameters import SharedLayout
-from ..machines.protocol import Array, Integers
 from .graded import Collected, without_balls
 
 # Rows handled at once: enough for the matrix products to be efficient, few enough to stay in cache.

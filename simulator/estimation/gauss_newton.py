@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from ballplate.simulator.computing.threads import scipy_linalg, single_threaded
+from ballplate.simulator.design.arrays import Design, State
+from ballplate.simulator.design.observations.lengths import Lengths
+from ballplate.simulator.design.parameters import SharedLayout, shared_layout
+from ballplate.simulator.geometry.motions import rotation_from_vector
+from ballplate.simulator.machines.protocol import Array
 
-from ..computing.threads import scipy_linalg, single_threaded
-from ..design.arrays import Design, State
-from ..design.observations.lengths import Lengths
-from ..design.parameters import SharedLayout, shared_layout
-from ..geometry.motions import rotation_from_vector
-from ..machines.protocol import Array
 from .covariance import Spectrum, no_spectrum, spectrum
 from .elimination import Factor, eliminate
 from .graded import triangle

@@ -13,9 +13,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-
-from ..computing.threads import scipy_linalg
-from ..machines.protocol import Array, Integers
+from ballplate.simulator.computing.threads import scipy_linalg
+from ballplate.simulator.machines.protocol import Array, Integers
 
 # Rows that are collected, in multiples of the columns, before they are brought to a triangle.
 COLLECTED = 8

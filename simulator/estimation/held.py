@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.machines.protocol import Integers
 
-from ..computing.threads import single_threaded
-from ..machines.protocol import Integers
 from .covariance import spectrum
 from .elimination import Factor
 from .graded import triangle

@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-
-from ..computing.decompositions import eigvalsh
-from ..design.arrays import Design, State
-from ..design.observations.balls import BallObservations, slopes_apart
-from ..machines.protocol import Array
+from ballplate.simulator.computing.decompositions import eigvalsh
+from ballplate.simulator.design.arrays import Design, State
+from ballplate.simulator.design.observations.balls import BallObservations, slopes_apart
+from ballplate.simulator.machines.protocol import Array
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array

@@ -10,19 +10,19 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-
-from ..computing.decompositions import lstsq, svd
-from ..computing.rounding import comparable
-from ..design.arrays import Design, State, nominal_state
-from ..design.objects import Flags
-from ..design.observations.readings import seen_places
-from ..geometry.motions import (
+from ballplate.simulator.computing.decompositions import lstsq, svd
+from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.design.arrays import Design, State, nominal_state
+from ballplate.simulator.design.objects import Flags
+from ballplate.simulator.design.observations.readings import seen_places
+from ballplate.simulator.geometry.motions import (
     fit_motion,
     rigid_motions,
     rotation_from_vector,
     vector_from_rotation,
 )
-from ..machines.protocol import Array, Integers
+from ballplate.simulator.machines.protocol import Array, Integers
+
 from .spheres import fit_sphere
 
 # Points whose spread across their main line is below this fraction of their length do not fix a

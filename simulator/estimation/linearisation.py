@@ -6,12 +6,12 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from ballplate.simulator.computing.rounding import blank
+from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.design.arrays import Design, State, nominal_state
+from ballplate.simulator.design.parameters import SharedLayout, shared_layout
+from ballplate.simulator.machines.protocol import Array
 
-from ..computing.rounding import blank
-from ..computing.threads import single_threaded
-from ..design.arrays import Design, State, nominal_state
-from ..design.parameters import SharedLayout, shared_layout
-from ..machines.protocol import Array
 from .covariance import MICROMETRE, BallCovariance, Spectrum, ball_covariance, spectrum
 from .elimination import Factor, eliminate
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-
-from ..computing.decompositions import lstsq
-from ..machines.protocol import Array
+from ballplate.simulator.computing.decompositions import lstsq
+from ballplate.simulator.machines.protocol import Array
 
 # Directions of the centre that points show by less than this fraction of what they show best are
 # left alone: a machine's errors and noise bend a plane by less.

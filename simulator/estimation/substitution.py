@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from ballplate.simulator.computing.threads import scipy_linalg
+from ballplate.simulator.machines.protocol import Array, Integers
 
-from ..computing.threads import scipy_linalg
-from ..machines.protocol import Array, Integers
 from .elimination import Factor
 
 

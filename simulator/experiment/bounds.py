@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from ballplate.simulator.design.lookup import Indices, References
+from ballplate.simulator.design.objects import Machine, Volume
+from ballplate.simulator.geometry.ball_layouts import BallLayout, frozen
+from ballplate.simulator.geometry.positions import AXIS_INDEX, Pose, ball_coordinates, corners
+from ballplate.simulator.inputs.messages import Steps
+from ballplate.simulator.inputs.number_arrays import Array
+from ballplate.simulator.inputs.settings import hint
 
-from ..design.lookup import Indices, References
-from ..design.objects import Machine, Volume
-from ..geometry.ball_layouts import BallLayout, frozen
-from ..geometry.positions import AXIS_INDEX, Pose, ball_coordinates, corners
-from ..inputs.messages import Steps
-from ..inputs.number_arrays import Array
-from ..inputs.settings import hint
 from .model import Probe
 from .pool_sections import LimitsSettings, Region
 from .structure import Sections

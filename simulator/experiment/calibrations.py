@@ -6,17 +6,16 @@ from collections import Counter
 from typing import Any
 
 import numpy as np
-
-from ..design.lookup import References
-from ..design.observations.balls import BallObservations
-from ..design.observations.calibration import Calibration
-from ..design.observations.distances import DistancesSettings
-from ..design.observations.kinds import read_calibration
-from ..design.observations.radius import RadiusSettings
-from ..geometry.artefacts import BallLayout, BryanGaugeSettings
-from ..inputs.messages import Steps
-from ..inputs.settings import listing
-from ..machines.protocol import Array
+from ballplate.simulator.design.lookup import References
+from ballplate.simulator.design.observations.balls import BallObservations
+from ballplate.simulator.design.observations.calibration import Calibration
+from ballplate.simulator.design.observations.distances import DistancesSettings
+from ballplate.simulator.design.observations.kinds import read_calibration
+from ballplate.simulator.design.observations.radius import RadiusSettings
+from ballplate.simulator.geometry.artefacts import BallLayout, BryanGaugeSettings
+from ballplate.simulator.inputs.messages import Steps
+from ballplate.simulator.inputs.settings import listing
+from ballplate.simulator.machines.protocol import Array
 
 
 def resolve_calibration(settings: Any, steps: Steps, references: References) -> Calibration | None:

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.inputs.yamltree import Mapping, Mark, Node, Scalar, Sequence
 
-from ..inputs.messages import ExperimentError
-from ..inputs.yamltree import Mapping, Mark, Node, Scalar, Sequence
 from .variants import override, removed, steps_of
 
 

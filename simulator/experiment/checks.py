@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping
 
 import numpy as np
+from ballplate.simulator.design.lookup import References
+from ballplate.simulator.design.observations.calibration import Calibration
+from ballplate.simulator.design.observations.distances import DistanceCalibration
+from ballplate.simulator.design.observations.radius import RadiusCalibration
+from ballplate.simulator.geometry.artefacts import BryanGaugeSettings, TwoSpheresSettings
+from ballplate.simulator.inputs.messages import Steps
+from ballplate.simulator.inputs.problems import Problems, written_text
+from ballplate.simulator.inputs.settings import listing
 
-from ..design.lookup import References
-from ..design.observations.calibration import Calibration
-from ..design.observations.distances import DistanceCalibration
-from ..design.observations.radius import RadiusCalibration
-from ..geometry.artefacts import BryanGaugeSettings, TwoSpheresSettings
-from ..inputs.messages import Steps
-from ..inputs.problems import Problems, written_text
-from ..inputs.settings import listing
 from .model import Position
 from .structure import Sections
 

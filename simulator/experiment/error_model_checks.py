@@ -4,17 +4,18 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..design.lookup import References
-from ..design.objects import Machine
-from ..inputs.extensions import provided
-from ..inputs.messages import ExperimentError, Steps
-from ..machines.model_kinds import CustomModelError
-from ..machines.settings import (
+from ballplate.simulator.design.lookup import References
+from ballplate.simulator.design.objects import Machine
+from ballplate.simulator.inputs.extensions import provided
+from ballplate.simulator.inputs.messages import ExperimentError, Steps
+from ballplate.simulator.machines.model_kinds import CustomModelError
+from ballplate.simulator.machines.settings import (
     build_error_model,
     kind_of,
 )
-from ..machines.true_machine_settings import FurtherTrueMachine, RandomSettings
-from ..machines.truth import TruthError, true_machine
+from ballplate.simulator.machines.true_machine_settings import FurtherTrueMachine, RandomSettings
+from ballplate.simulator.machines.truth import TruthError, true_machine
+
 from .structure import Sections
 
 _TRUE_MODEL = ("true_machine", "error_model")

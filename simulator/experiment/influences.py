@@ -6,20 +6,20 @@ from collections import Counter
 from dataclasses import replace
 
 import numpy as np
-
-from ..design.arrays import (
+from ballplate.simulator.design.arrays import (
     Design,
     disturbed_readings,
     in_sequence,
     locations,
     nominal_state,
 )
-from ..design.influences.checks import few, wrong_of_parameters, wrong_of_shifts
-from ..design.influences.protocol import InfluenceParameter, InfluenceSettings
-from ..design.lookup import References
-from ..design.observations.priors import Priors
-from ..inputs.messages import ExperimentError
-from ..machines.protocol import Integers
+from ballplate.simulator.design.influences.checks import few, wrong_of_parameters, wrong_of_shifts
+from ballplate.simulator.design.influences.protocol import InfluenceParameter, InfluenceSettings
+from ballplate.simulator.design.lookup import References
+from ballplate.simulator.design.observations.priors import Priors
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.machines.protocol import Integers
+
 from .model import Experiment, Position
 from .size_checks import MOST_SHARED
 from .structure import Sections

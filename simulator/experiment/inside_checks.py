@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from ballplate.simulator.design.lookup import References
+from ballplate.simulator.design.objects import SLIGHTLY, Volume
+from ballplate.simulator.geometry.motions import AXIS_NAMES
+from ballplate.simulator.geometry.positions import ball_coordinates
+from ballplate.simulator.inputs.messages import Steps
+from ballplate.simulator.inputs.number_arrays import Array
+from ballplate.simulator.inputs.problems import Problems
+from ballplate.simulator.inputs.quantity_words import format_length
+from ballplate.simulator.inputs.settings import number_of
+from ballplate.simulator.inputs.yamltree import Mark
 
-from ..design.lookup import References
-from ..design.objects import SLIGHTLY, Volume
-from ..geometry.motions import AXIS_NAMES
-from ..geometry.positions import ball_coordinates
-from ..inputs.messages import Steps
-from ..inputs.number_arrays import Array
-from ..inputs.problems import Problems
-from ..inputs.quantity_words import format_length
-from ..inputs.settings import number_of
-from ..inputs.yamltree import Mark
 from .model import Position, Probe
 
 TOLERANCE = 1e-9

@@ -7,9 +7,9 @@ from __future__ import annotations
 from contextlib import suppress
 from typing import Any
 
+from ballplate.simulator.inputs.extensions import MissingExtensionError, names, provided
 from pydantic import create_model
 
-from ..inputs.extensions import MissingExtensionError, names, provided
 from .sections import ExperimentSettings
 
 DRAFT = "https://json-schema.org/draft/2020-12/schema"

@@ -7,11 +7,10 @@ from __future__ import annotations
 from collections.abc import Collection
 
 import numpy as np
-
-from ..computing.decompositions import svd
-from ..computing.rounding import comparable
-from ..design.arrays import Design, Observations, Readings
-from ..design.objects import (
+from ballplate.simulator.computing.decompositions import svd
+from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.design.arrays import Design, Observations, Readings
+from ballplate.simulator.design.objects import (
     Artefacts,
     Balls,
     EvaluationPoints,
@@ -21,20 +20,25 @@ from ..design.objects import (
     Tasks,
     Volume,
 )
-from ..design.observations.balls import BallObservations
-from ..design.observations.coordinates import CalibratedCoordinates, flat, no_coordinates
-from ..design.observations.distances import CalibratedDistances, no_distances
-from ..design.observations.joint_values import JointValues
-from ..design.observations.priors import Priors
-from ..design.observations.radius import RadiusCalibration
-from ..design.observations.star import Stars, observed_stars
-from ..geometry.artefacts import BryanGaugeSettings
-from ..geometry.motions import pose_size
-from ..inputs.messages import ExperimentError
-from ..inputs.number_arrays import Integers
-from ..inputs.yamltree import Mark
-from ..machines.protocol import Array
-from ..machines.settings import build_error_model
+from ballplate.simulator.design.observations.balls import BallObservations
+from ballplate.simulator.design.observations.coordinates import (
+    CalibratedCoordinates,
+    flat,
+    no_coordinates,
+)
+from ballplate.simulator.design.observations.distances import CalibratedDistances, no_distances
+from ballplate.simulator.design.observations.joint_values import JointValues
+from ballplate.simulator.design.observations.priors import Priors
+from ballplate.simulator.design.observations.radius import RadiusCalibration
+from ballplate.simulator.design.observations.star import Stars, observed_stars
+from ballplate.simulator.geometry.artefacts import BryanGaugeSettings
+from ballplate.simulator.geometry.motions import pose_size
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.inputs.number_arrays import Integers
+from ballplate.simulator.inputs.yamltree import Mark
+from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.machines.settings import build_error_model
+
 from .influences import with_influences
 from .length_standards import standard_lengths
 from .model import Experiment, Prior

@@ -7,15 +7,15 @@ from dataclasses import dataclass, replace
 from itertools import count
 
 import numpy as np
+from ballplate.simulator.design.arrays import Readings
+from ballplate.simulator.design.objects import UnknownLengths
+from ballplate.simulator.design.observations.distances import DistanceCalibration
+from ballplate.simulator.design.observations.lengths import Lengths
+from ballplate.simulator.design.observations.radius import RadiusCalibration
+from ballplate.simulator.design.observations.whitening import at_least_exact
+from ballplate.simulator.geometry.artefacts import BryanGaugeSettings, TwoSpheresSettings
+from ballplate.simulator.machines.protocol import Array, Integers
 
-from ..design.arrays import Readings
-from ..design.objects import UnknownLengths
-from ..design.observations.distances import DistanceCalibration
-from ..design.observations.lengths import Lengths
-from ..design.observations.radius import RadiusCalibration
-from ..design.observations.whitening import at_least_exact
-from ..geometry.artefacts import BryanGaugeSettings, TwoSpheresSettings
-from ..machines.protocol import Array, Integers
 from .model import Experiment
 
 

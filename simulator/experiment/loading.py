@@ -10,15 +10,23 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from ballplate.simulator.inputs.decoding import refuse_long_lines
+from ballplate.simulator.inputs.extensions import service
+from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.inputs.problems import Problems, in_order, written_count
+from ballplate.simulator.inputs.trust import OPENED, Trust
+from ballplate.simulator.inputs.yamltree import (
+    Mapping,
+    Mark,
+    Node,
+    mark_of,
+    parse_tree,
+    read_text,
+    written,
+)
+from ballplate.simulator.machines.settings import with_defaults
+from ballplate.simulator.machines.true_machine_settings import with_model_defaults
 
-from ..inputs.decoding import refuse_long_lines
-from ..inputs.extensions import service
-from ..inputs.messages import ExperimentError, Message
-from ..inputs.problems import Problems, in_order, written_count
-from ..inputs.trust import OPENED, Trust
-from ..inputs.yamltree import Mapping, Mark, Node, mark_of, parse_tree, read_text, written
-from ..machines.settings import with_defaults
-from ..machines.true_machine_settings import with_model_defaults
 from .bounds import resolve_bounds
 from .calibrations import resolve_calibration
 from .changes import node_of

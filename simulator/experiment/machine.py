@@ -8,18 +8,18 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from ballplate.simulator.design.lookup import References
+from ballplate.simulator.design.noise import Noise, NoiseSettings
+from ballplate.simulator.design.objects import Machine, Volume
+from ballplate.simulator.geometry.ball_layouts import frozen
+from ballplate.simulator.inputs.messages import ExperimentError, Steps
+from ballplate.simulator.inputs.number_arrays import Array
+from ballplate.simulator.inputs.problems import Problems
+from ballplate.simulator.inputs.quantities import LengthFunction, Target
+from ballplate.simulator.inputs.quantity_words import format_length, typed_length
+from ballplate.simulator.inputs.settings import hint
+from ballplate.simulator.inputs.tables import read_table
 
-from ..design.lookup import References
-from ..design.noise import Noise, NoiseSettings
-from ..design.objects import Machine, Volume
-from ..geometry.ball_layouts import frozen
-from ..inputs.messages import ExperimentError, Steps
-from ..inputs.number_arrays import Array
-from ..inputs.problems import Problems
-from ..inputs.quantities import LengthFunction, Target
-from ..inputs.quantity_words import format_length, typed_length
-from ..inputs.settings import hint
-from ..inputs.tables import read_table
 from .inside_checks import TOLERANCE, check_points
 from .model import Evaluation, Probe, Task
 from .sections import MOST_POINTS, MachineSettings, PointsSettings, TaskSettings

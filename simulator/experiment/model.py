@@ -10,26 +10,26 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from ballplate.simulator.design.influences.protocol import InfluenceSettings
+from ballplate.simulator.design.lookup import Indices
+from ballplate.simulator.design.noise import Noise
+from ballplate.simulator.design.objects import Machine
+from ballplate.simulator.design.observations.calibration import Calibration
+from ballplate.simulator.design.observations.star import Star
+from ballplate.simulator.geometry.ball_layouts import ArtefactSettings, BallLayout
+from ballplate.simulator.geometry.positions import Pose
+from ballplate.simulator.inputs.messages import ExperimentError, Message, Steps, format_path
+from ballplate.simulator.inputs.number_arrays import Array
+from ballplate.simulator.inputs.quantities import Target
+from ballplate.simulator.inputs.trust import UNKNOWN, Trust
+from ballplate.simulator.inputs.yamltree import Mark, Node, mark_of, to_python, written
+from ballplate.simulator.maps.map_prior import EarlierCampaign, MapData, MapShare
 
-from ..design.influences.protocol import InfluenceSettings
-from ..design.lookup import Indices
-from ..design.noise import Noise
-from ..design.objects import Machine
-from ..design.observations.calibration import Calibration
-from ..design.observations.star import Star
-from ..geometry.ball_layouts import ArtefactSettings, BallLayout
-from ..geometry.positions import Pose
-from ..inputs.messages import ExperimentError, Message, Steps, format_path
-from ..inputs.number_arrays import Array
-from ..inputs.quantities import Target
-from ..inputs.trust import UNKNOWN, Trust
-from ..inputs.yamltree import Mark, Node, mark_of, to_python, written
-from ..maps.map_prior import EarlierCampaign, MapData, MapShare
 from .changes import changed_tree
 from .readings_section import ReadingsSettings, no_settings
 
 if TYPE_CHECKING:
-    from ..machines.protocol import Unit
+    from ballplate.simulator.machines.protocol import Unit
 
 
 @dataclass(frozen=True, eq=False)

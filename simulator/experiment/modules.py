@@ -7,8 +7,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from ..inputs.messages import ExperimentError, Steps
-from ..inputs.yamltree import Mapping, Node, Scalar, read_tree, walk
+from ballplate.simulator.inputs.messages import ExperimentError, Steps
+from ballplate.simulator.inputs.yamltree import Mapping, Node, Scalar, read_tree, walk
 
 
 def python_models(root: Node) -> Iterator[tuple[Steps, Mapping]]:

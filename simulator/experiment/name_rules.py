@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import re
 
-from ..inputs.settings import shorten
+from ballplate.simulator.inputs.settings import shorten
 
 PLACES = ("position", "ball", "probe", "run")
 PLACE = re.compile(r"\{([^{}]*)\}")

@@ -12,8 +12,15 @@ import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path, PureWindowsPath
 
-from ..inputs.messages import ExperimentError
-from ..inputs.yamltree import Mapping, Node, Scalar, Sequence as Entries, read_tree
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.inputs.yamltree import (
+    Mapping,
+    Node,
+    Scalar,
+    Sequence as Entries,
+    read_tree,
+)
+
 from .modules import python_models
 
 MODULE = ".py"

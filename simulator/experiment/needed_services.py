@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..inputs.extensions import MissingExtensionError, service
-from ..inputs.messages import Steps
-from ..inputs.problems import Problems
+from ballplate.simulator.inputs.extensions import MissingExtensionError, service
+from ballplate.simulator.inputs.messages import Steps
+from ballplate.simulator.inputs.problems import Problems
 
 
 def needed_service(name: str, steps: Steps, problems: Problems) -> Any | None:

@@ -4,9 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..design.lookup import References
-from ..inputs.extensions import is_installed, module_with, owner, registered, shipped
-from ..inputs.problems import Problems
+from ballplate.simulator.design.lookup import References
+from ballplate.simulator.inputs.extensions import (
+    is_installed,
+    module_with,
+    owner,
+    registered,
+    shipped,
+)
+from ballplate.simulator.inputs.problems import Problems
+
 from .structure import KEYS, Sections
 
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import Any, Literal
 
 import numpy as np
-
-from ..design.lookup import References, lengths_per_axis
-from ..geometry.ball_layouts import BallLayout
-from ..geometry.positions import (
+from ballplate.simulator.design.lookup import References, lengths_per_axis
+from ballplate.simulator.geometry.ball_layouts import BallLayout
+from ballplate.simulator.geometry.positions import (
     AXIS_INDEX,
     IN_PLANE_AXES,
     Axis,
@@ -17,8 +16,9 @@ from ..geometry.positions import (
     Pose,
     nominal_pose,
 )
-from ..inputs.messages import Steps
-from ..inputs.room_parts import Place, RoomPart, length_of
+from ballplate.simulator.inputs.messages import Steps
+from ballplate.simulator.inputs.room_parts import Place, RoomPart, length_of
+
 from .bounds import Bounds, edge_of, limits_of, shared
 from .model import Position, ReadingGroup
 from .position_sections import PositionSettings, ReadingSettings

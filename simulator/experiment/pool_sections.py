@@ -5,16 +5,16 @@ from __future__ import annotations
 from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, Union
 
+from ballplate.simulator.design.observations.coordinates import CalibratedBalls
+from ballplate.simulator.design.observations.kinds import CALIBRATIONS
+from ballplate.simulator.geometry.ball_layouts import Name
+from ballplate.simulator.geometry.positions import Axis
+from ballplate.simulator.inputs.open_kinds import OpenKinds
+from ballplate.simulator.inputs.quantity_types import Duration, Length
+from ballplate.simulator.inputs.room_parts import Place, RoomPart
+from ballplate.simulator.inputs.settings import Forms, NonEmpty, Settings, Several, Text
 from pydantic import Discriminator, Field, Tag, create_model, model_validator
 
-from ..design.observations.coordinates import CalibratedBalls
-from ..design.observations.kinds import CALIBRATIONS
-from ..geometry.ball_layouts import Name
-from ..geometry.positions import Axis
-from ..inputs.open_kinds import OpenKinds
-from ..inputs.quantity_types import Duration, Length
-from ..inputs.room_parts import Place, RoomPart
-from ..inputs.settings import Forms, NonEmpty, Settings, Several, Text
 from .position_sections import Count, LengthPerAxis, PositionSettings, ProbeNames, QuarterTurns
 
 GROUP_KEYS = ("planes", "levels", "corners", "centres")

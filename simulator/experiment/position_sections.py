@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
+from ballplate.simulator.geometry.ball_layouts import BallNames, Name
+from ballplate.simulator.geometry.positions import Axis
+from ballplate.simulator.inputs.quantity_types import Angle, PositiveLength
+from ballplate.simulator.inputs.room_parts import Place
+from ballplate.simulator.inputs.settings import Forms, NonEmpty, Settings
 from pydantic import Field
-
-from ..geometry.ball_layouts import BallNames, Name
-from ..geometry.positions import Axis
-from ..inputs.quantity_types import Angle, PositiveLength
-from ..inputs.room_parts import Place
-from ..inputs.settings import Forms, NonEmpty, Settings
 
 Count = Annotated[int, Field(ge=1, le=10_000)]
 ProbeNames = NonEmpty[Name]

@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from ballplate.simulator.design.lookup import References
+from ballplate.simulator.design.objects import Machine
+from ballplate.simulator.geometry.artefacts import BryanGaugeSettings
+from ballplate.simulator.geometry.motions import AXIS_NAMES, pose_parameter_names
+from ballplate.simulator.inputs.messages import Steps, format_path
+from ballplate.simulator.inputs.number_arrays import Array
+from ballplate.simulator.inputs.quantities import PARSERS, QuantityError
+from ballplate.simulator.inputs.settings import hint, shorten
+from ballplate.simulator.inputs.yamltree import mark_of
+from ballplate.simulator.machines.model_kinds import CustomModelError
+from ballplate.simulator.machines.protocol import ErrorModel, Unit
+from ballplate.simulator.machines.settings import build_error_model, kind_of
 
-from ..design.lookup import References
-from ..design.objects import Machine
-from ..geometry.artefacts import BryanGaugeSettings
-from ..geometry.motions import AXIS_NAMES, pose_parameter_names
-from ..inputs.messages import Steps, format_path
-from ..inputs.number_arrays import Array
-from ..inputs.quantities import PARSERS, QuantityError
-from ..inputs.settings import hint, shorten
-from ..inputs.yamltree import mark_of
-from ..machines.model_kinds import CustomModelError
-from ..machines.protocol import ErrorModel, Unit
-from ..machines.settings import build_error_model, kind_of
 from .model import Position, Prior, Probe
 from .needed_services import needed_service
 from .sections import MapPriorSettings, PriorSettings

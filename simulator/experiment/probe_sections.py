@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, Self
 
+from ballplate.simulator.geometry.ball_layouts import Coordinates, Name
+from ballplate.simulator.inputs.quantity_types import Angle, PositiveLength
+from ballplate.simulator.inputs.settings import Forms, Settings, Text
 from pydantic import Field, model_validator
 
-from ..geometry.ball_layouts import Coordinates, Name
-from ..inputs.quantity_types import Angle, PositiveLength
-from ..inputs.settings import Forms, Settings, Text
 from .position_sections import LengthPerAxis
 
 StarProbes = Annotated[tuple[Name, ...], Field(min_length=2)]

@@ -7,16 +7,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from ballplate.simulator.design.lookup import References, lengths_per_axis
+from ballplate.simulator.design.observations.star import Star
+from ballplate.simulator.geometry.ball_layouts import frozen
+from ballplate.simulator.geometry.rotations import rotation_matrix
+from ballplate.simulator.inputs.messages import ExperimentError, Steps
+from ballplate.simulator.inputs.number_arrays import Array
+from ballplate.simulator.inputs.settings import hint, listing
+from ballplate.simulator.inputs.tables import read_table
+from ballplate.simulator.inputs.yamltree import written
 
-from ..design.lookup import References, lengths_per_axis
-from ..design.observations.star import Star
-from ..geometry.ball_layouts import frozen
-from ..geometry.rotations import rotation_matrix
-from ..inputs.messages import ExperimentError, Steps
-from ..inputs.number_arrays import Array
-from ..inputs.settings import hint, listing
-from ..inputs.tables import read_table
-from ..inputs.yamltree import written
 from .model import Probe
 from .probe_sections import HeadSettings, ProbeSettings, StarSettings
 from .references import DEFAULT_PROBE

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import codecs
 
-from ..design.lookup import References
-from ..inputs.messages import ExperimentError, Steps
-from ..inputs.quantities import QuantityError, parse_positive_length
-from ..inputs.settings import hint
-from ..inputs.units import LENGTH_UNITS, plain_unit
+from ballplate.simulator.design.lookup import References
+from ballplate.simulator.inputs.messages import ExperimentError, Steps
+from ballplate.simulator.inputs.quantities import QuantityError, parse_positive_length
+from ballplate.simulator.inputs.settings import hint
+from ballplate.simulator.inputs.units import LENGTH_UNITS, plain_unit
+
 from .name_rules import check_rule
 from .needed_services import needed_service
 from .readings_section import ColumnsSettings, CompensationSettings, ReadingsSettings

@@ -6,11 +6,10 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
+from ballplate.simulator.geometry.ball_layouts import Coordinates, Name
+from ballplate.simulator.inputs.settings import Forms, NonEmpty, Settings, Text
+from ballplate.simulator.machines.protocol import TrueMachine
 from pydantic import Field, PrivateAttr
-
-from ..geometry.ball_layouts import Coordinates, Name
-from ..inputs.settings import Forms, NonEmpty, Settings, Text
-from ..machines.protocol import TrueMachine
 
 Coordinate = Literal["scale readings", "ball centres", "part"]
 

@@ -5,23 +5,23 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-
-from ..design.lookup import References
-from ..geometry.artefacts import BallsSettings, BryanGaugeSettings
-from ..geometry.ball_layouts import (
+from ballplate.simulator.design.lookup import References
+from ballplate.simulator.geometry.artefacts import BallsSettings, BryanGaugeSettings
+from ballplate.simulator.geometry.ball_layouts import (
     MOST_BALLS,
     ArtefactSettings,
     BallLayout,
     LayoutError,
     coincident_balls,
 )
-from ..inputs.messages import ExperimentError, Steps
-from ..inputs.problems import Problems, written_keys
-from ..inputs.quantity_words import format_length
-from ..inputs.settings import hint, shorten
-from ..inputs.tables import read_table
-from ..inputs.trust import Trust
-from ..inputs.yamltree import Mapping, Node, Sequence as SequenceNode, written
+from ballplate.simulator.inputs.messages import ExperimentError, Steps
+from ballplate.simulator.inputs.problems import Problems, written_keys
+from ballplate.simulator.inputs.quantity_words import format_length
+from ballplate.simulator.inputs.settings import hint, shorten
+from ballplate.simulator.inputs.tables import read_table
+from ballplate.simulator.inputs.trust import Trust
+from ballplate.simulator.inputs.yamltree import Mapping, Node, Sequence as SequenceNode, written
+
 from .structure import Sections
 
 DEFAULT_PROBE = "probe"

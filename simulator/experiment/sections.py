@@ -6,18 +6,18 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, Self
 
+from ballplate.simulator.design.influences.kinds import AnyInfluence
+from ballplate.simulator.design.noise import Distribution, NoiseSettings
+from ballplate.simulator.design.observations.kinds import CalibrationSettings
+from ballplate.simulator.geometry.artefacts import ARTEFACTS, AnyArtefactSettings
+from ballplate.simulator.geometry.ball_layouts import Coordinates, Name
+from ballplate.simulator.inputs.days import Day
+from ballplate.simulator.inputs.quantity_types import Length, PositiveLength, TargetFunction
+from ballplate.simulator.inputs.settings import Forms, NonEmpty, Settings, Several, Text
+from ballplate.simulator.machines.settings import ErrorModelSettings
+from ballplate.simulator.machines.true_machine_settings import TrueMachineSettings, ZeroSettings
 from pydantic import Discriminator, Field, StringConstraints, Tag, model_validator
 
-from ..design.influences.kinds import AnyInfluence
-from ..design.noise import Distribution, NoiseSettings
-from ..design.observations.kinds import CalibrationSettings
-from ..geometry.artefacts import ARTEFACTS, AnyArtefactSettings
-from ..geometry.ball_layouts import Coordinates, Name
-from ..inputs.days import Day
-from ..inputs.quantity_types import Length, PositiveLength, TargetFunction
-from ..inputs.settings import Forms, NonEmpty, Settings, Several, Text
-from ..machines.settings import ErrorModelSettings
-from ..machines.true_machine_settings import TrueMachineSettings, ZeroSettings
 from .pool_sections import PoolSettings
 from .position_sections import Edges, LengthPerAxis, PositionSettings
 from .probe_sections import AnyProbe, HeadSettings, StarSettings

@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping
 
 import numpy as np
-
-from ..design.lookup import Indices, References
-from ..design.objects import Machine
-from ..design.observations.calibration import Calibration
-from ..design.observations.distances import DistanceCalibration
-from ..geometry.artefacts import BryanGaugeSettings
-from ..geometry.motions import pose_size
-from ..inputs.messages import Steps
-from ..machines.settings import (
+from ballplate.simulator.design.lookup import Indices, References
+from ballplate.simulator.design.objects import Machine
+from ballplate.simulator.design.observations.calibration import Calibration
+from ballplate.simulator.design.observations.distances import DistanceCalibration
+from ballplate.simulator.geometry.artefacts import BryanGaugeSettings
+from ballplate.simulator.geometry.motions import pose_size
+from ballplate.simulator.inputs.messages import Steps
+from ballplate.simulator.machines.settings import (
     build_error_model,
 )
+
 from .model import Evaluation, Position, Probe
 from .structure import Sections
 

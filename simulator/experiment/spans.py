@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from ballplate.simulator.design.objects import SLIGHTLY
+from ballplate.simulator.geometry.positions import ball_coordinates
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.inputs.number_arrays import Array
+from ballplate.simulator.inputs.yamltree import Node
 
-from ..design.objects import SLIGHTLY
-from ..geometry.positions import ball_coordinates
-from ..inputs.messages import ExperimentError
-from ..inputs.number_arrays import Array
-from ..inputs.yamltree import Node
 from .bounds import TOLERANCE
 from .model import Experiment, Position
 from .variants import node_at

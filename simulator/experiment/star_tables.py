@@ -8,10 +8,9 @@ symmetric star form one: distances would not show it.
 from __future__ import annotations
 
 import numpy as np
-
-from ..design.observations.star import Star
-from ..inputs.settings import listing
-from ..machines.protocol import Array
+from ballplate.simulator.design.observations.star import Star
+from ballplate.simulator.inputs.settings import listing
+from ballplate.simulator.machines.protocol import Array
 
 # Stated offsets are nominal, and wrong by this much in metres before anybody need be told.
 NOMINAL = 3e-3

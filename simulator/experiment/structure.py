@@ -7,19 +7,19 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import Annotated, Any
 
+from ballplate.simulator.design.influences.kinds import AnyInfluence
+from ballplate.simulator.design.observations.kinds import CalibrationSettings
+from ballplate.simulator.geometry.artefacts import AnyArtefactSettings
+from ballplate.simulator.inputs.extensions import MissingExtensionError, names, provided
+from ballplate.simulator.inputs.messages import Steps
+from ballplate.simulator.inputs.problems import Problems
+from ballplate.simulator.inputs.settings import Settings, describe, hint, nearest
+from ballplate.simulator.inputs.unusable import UnusableError
+from ballplate.simulator.inputs.validation import explain_in, type_adapter
+from ballplate.simulator.inputs.wording import LACKING
+from ballplate.simulator.inputs.yamltree import Mapping, Node, Scalar, Sequence, to_python
 from pydantic import TypeAdapter, ValidationError
 
-from ..design.influences.kinds import AnyInfluence
-from ..design.observations.kinds import CalibrationSettings
-from ..geometry.artefacts import AnyArtefactSettings
-from ..inputs.extensions import MissingExtensionError, names, provided
-from ..inputs.messages import Steps
-from ..inputs.problems import Problems
-from ..inputs.settings import Settings, describe, hint, nearest
-from ..inputs.unusable import UnusableError
-from ..inputs.validation import explain_in, type_adapter
-from ..inputs.wording import LACKING
-from ..inputs.yamltree import Mapping, Node, Scalar, Sequence, to_python
 from .pool_sections import GroupSettings, ListedSettings, PoolSettings, PricedSettings, is_group
 from .position_sections import PositionSettings
 from .probe_sections import AnyProbe, StarSettings

@@ -7,11 +7,20 @@ from collections.abc import Collection, Sequence as AnySequence
 from dataclasses import replace
 from pathlib import Path
 
-from ..inputs.extensions import provider
-from ..inputs.messages import Message, format_path
-from ..inputs.problems import Problems
-from ..inputs.settings import describe, hint, listing
-from ..inputs.yamltree import Mapping, Mark, Node, Scalar, Sequence, child, to_python
+from ballplate.simulator.inputs.extensions import provider
+from ballplate.simulator.inputs.messages import Message, format_path
+from ballplate.simulator.inputs.problems import Problems
+from ballplate.simulator.inputs.settings import describe, hint, listing
+from ballplate.simulator.inputs.yamltree import (
+    Mapping,
+    Mark,
+    Node,
+    Scalar,
+    Sequence,
+    child,
+    to_python,
+)
+
 from .sections import ExperimentSettings
 
 MOST_VARIANTS = 1000

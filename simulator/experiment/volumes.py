@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ..inputs.messages import Steps
-from ..inputs.problems import Problems
-from ..inputs.quantity_words import format_length
+from ballplate.simulator.inputs.messages import Steps
+from ballplate.simulator.inputs.problems import Problems
+from ballplate.simulator.inputs.quantity_words import format_length
 
 
 def check_ends(ends: Mapping[str, tuple[float, float]], steps: Steps, problems: Problems) -> bool:

@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Literal, Self, Union
 
+from ballplate.simulator.inputs.open_kinds import OpenKinds
+from ballplate.simulator.inputs.quantity_types import PositiveLength
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from ..inputs.open_kinds import OpenKinds
-from ..inputs.quantity_types import PositiveLength
 from .ball_layouts import (
     MOST_BALLS,
     ArtefactSettings,

@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from ballplate.simulator.inputs.number_arrays import Array
 
-from ..inputs.number_arrays import Array
 from .ball_layouts import AxesSettings, BallLayout
 
 # A ball nominally this near to an axis, as a fraction of its distance from the origin, is meant to

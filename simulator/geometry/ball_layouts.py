@@ -11,12 +11,11 @@ from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
+from ballplate.simulator.inputs.number_arrays import Array
+from ballplate.simulator.inputs.quantity_types import Length, PositiveLength
+from ballplate.simulator.inputs.settings import NonEmpty, Settings, listing, nearest, shorten
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field, StringConstraints, model_validator
-
-from ..inputs.number_arrays import Array
-from ..inputs.quantity_types import Length, PositiveLength
-from ..inputs.settings import NonEmpty, Settings, listing, nearest, shorten
 
 MOST_BALLS = 40_000
 COINCIDENT = 1e-9

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-
-from ..inputs.number_arrays import Array
+from ballplate.simulator.inputs.number_arrays import Array
 
 
 def grid_points(sides: Iterable[Array]) -> Array:

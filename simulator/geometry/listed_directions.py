@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import Annotated, Self
 
 import numpy as np
+from ballplate.simulator.inputs.number_arrays import Array
+from ballplate.simulator.inputs.quantity_types import Angle
+from ballplate.simulator.inputs.settings import Forms, Settings
 from pydantic import Field, model_validator
-
-from ..inputs.number_arrays import Array
-from ..inputs.quantity_types import Angle
-from ..inputs.settings import Forms, Settings
 
 MOST_DIRECTIONS = 5000
 UPRIGHT = 0.5 * np.pi

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-
-from ..computing.decompositions import svd
-from ..inputs.number_arrays import Array
+from ballplate.simulator.computing.decompositions import svd
+from ballplate.simulator.inputs.number_arrays import Array
 
 AXIS_NAMES = ("x", "y", "z")
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from ballplate.simulator.inputs.number_arrays import Array
+from ballplate.simulator.inputs.room_parts import Place, RoomPart
 
-from ..inputs.number_arrays import Array
-from ..inputs.room_parts import Place, RoomPart
 from .ball_layouts import BallLayout
 from .rotations import rotation_matrix
 

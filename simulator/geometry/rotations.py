@@ -6,8 +6,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-
-from ..inputs.number_arrays import Array
+from ballplate.simulator.inputs.number_arrays import Array
 
 
 def cosine_and_sine(angle: float) -> tuple[float, float]:

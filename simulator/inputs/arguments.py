@@ -6,7 +6,8 @@ import os
 from collections.abc import Sequence
 
 import numpy as np
-from ballplate.simulator.inputs.settings import hint, shorten
+
+from .settings import hint, shorten
 
 
 def ensure_whole(least: int, most: int | None = None, **arguments: object) -> None:

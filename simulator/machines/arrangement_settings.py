@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, Self
 
+from ballplate.simulator.inputs.settings import Settings
 from pydantic import Field, model_validator
 
-from ..inputs.settings import Settings
 from .arrangement import ARRANGEMENTS, Arrangement
 
 AxisName = Literal["x", "y", "z"]

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any, Literal, Self
 
+from ballplate.simulator.inputs.settings import Forms, Settings
+from ballplate.simulator.splines.knots import with_boundaries
 from pydantic import Field, model_validator
 
-from ..inputs.settings import Forms, Settings
-from ..splines.knots import with_boundaries
 from .bases import Basis, Ends, Monomial, Polynomial, Spline
 
 

@@ -15,9 +15,9 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
+from ballplate.simulator.geometry.grids import even_grid
+from ballplate.simulator.geometry.motions import cross_matrices
 
-from ..geometry.grids import even_grid
-from ..geometry.motions import cross_matrices
 from .protocol import Array, Line, Parameter, Reported, Unit
 from .rigid_chain import rotation_and_derivatives
 from .terms import Terms

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Annotated, Any, Literal, Self
 
+from ballplate.simulator.inputs.settings import Forms, Settings
 from pydantic import ConfigDict, Discriminator, Field, Tag, model_validator
 
-from ..inputs.settings import Forms, Settings
 from .bases import Basis
 from .basis_settings import BASIS, BasisSettings, SplineSettings, basis_of, without
 from .empirical import empirical_model

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, Self
 
+from ballplate.simulator.inputs.messages import Steps
+from ballplate.simulator.inputs.settings import Forms, Settings
 from pydantic import Field, create_model, model_validator
 
-from ..inputs.messages import Steps
-from ..inputs.settings import Forms, Settings
 from .arrangement_settings import (
     ARRANGEMENT,
     PRODUCTS,

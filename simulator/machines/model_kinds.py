@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..inputs.messages import Steps
-from ..inputs.settings import Settings
-from ..inputs.trust import Trust
-from ..inputs.unusable import UnusableError
+from ballplate.simulator.inputs.messages import Steps
+from ballplate.simulator.inputs.settings import Settings
+from ballplate.simulator.inputs.trust import Trust
+from ballplate.simulator.inputs.unusable import UnusableError
+
 from .protocol import ErrorModel
 
 Corner = tuple[float, ...]

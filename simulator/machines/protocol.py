@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
-
-from ..inputs.number_arrays import Array, Integers as Integers
+from ballplate.simulator.inputs.number_arrays import Array, Integers as Integers
 
 Unit = Literal["m", "rad", "1", "K", "1/K", "m/h", "1/h"]
 

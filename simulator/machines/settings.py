@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, Union, get_args
 
+from ballplate.simulator.inputs.extensions import provided
+from ballplate.simulator.inputs.messages import Steps
+from ballplate.simulator.inputs.open_kinds import OpenKinds
+from ballplate.simulator.inputs.settings import Settings, listing
 from pydantic import Field
 
-from ..inputs.extensions import provided
-from ..inputs.messages import Steps
-from ..inputs.open_kinds import OpenKinds
-from ..inputs.settings import Settings, listing
 from .empirical_settings import EMPIRICAL
 from .kinematic_settings import KINEMATIC
 from .metric import MetricModel, Scale

@@ -13,8 +13,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from ballplate.simulator.computing.decompositions import eigvalsh
 
-from ..computing.decompositions import eigvalsh
 from .protocol import Array, Parameter, Reported
 
 AXES = ("x", "y", "z")

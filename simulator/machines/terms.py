@@ -14,8 +14,8 @@ from itertools import product
 from typing import Literal
 
 import numpy as np
+from ballplate.simulator.geometry.grids import even_grid
 
-from ..geometry.grids import even_grid
 from .bases import Basis, Monomial, Quoted, Spline, whole_values
 from .protocol import Array
 

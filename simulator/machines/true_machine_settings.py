@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args
 
+from ballplate.simulator.inputs.open_kinds import OpenKinds
+from ballplate.simulator.inputs.quantity_types import Angle, PositiveLength
+from ballplate.simulator.inputs.settings import Settings
 from pydantic import Field
 
-from ..inputs.open_kinds import OpenKinds
-from ..inputs.quantity_types import Angle, PositiveLength
-from ..inputs.settings import Settings
 from .model_kinds import Corner
 from .protocol import ErrorModel, TrueMachine
 from .settings import ErrorModelSettings, with_defaults

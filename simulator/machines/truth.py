@@ -7,10 +7,10 @@ from __future__ import annotations
 from collections.abc import Collection
 
 import numpy as np
+from ballplate.simulator.computing.decompositions import lstsq
+from ballplate.simulator.inputs.quantities import PARSERS, QuantityError
+from ballplate.simulator.inputs.settings import Settings, hint
 
-from ..computing.decompositions import lstsq
-from ..inputs.quantities import PARSERS, QuantityError
-from ..inputs.settings import Settings, hint
 from .error_names import AXIS_ERRORS, SQUARENESS_ERRORS, AxisError
 from .model_kinds import Corner
 from .protocol import Array, ErrorModel, HasLines, TrueMachine

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-
-from ..computing.decompositions import lstsq
-from ..design.arrays import (
+from ballplate.simulator.computing.decompositions import lstsq
+from ballplate.simulator.design.arrays import (
     Design,
     Readings,
     State,
@@ -17,12 +16,12 @@ from ..design.arrays import (
     nominal_state,
     reading_uncertainties,
 )
-from ..design.observations.balls import slopes_apart
-from ..design.observations.joint_lengths import FLAT
-from ..design.observations.lengths import Lengths
-from ..design.observations.whitening import at_least_exact
-from ..machines.protocol import Array, ErrorModel, Integers
-from ..machines.truth import TrueMachine
+from ballplate.simulator.design.observations.balls import slopes_apart
+from ballplate.simulator.design.observations.joint_lengths import FLAT
+from ballplate.simulator.design.observations.lengths import Lengths
+from ballplate.simulator.design.observations.whitening import at_least_exact
+from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers
+from ballplate.simulator.machines.truth import TrueMachine
 
 
 class NoReadingError(ValueError):

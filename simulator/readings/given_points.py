@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
-
-from ..design.objects import Volume
-from ..inputs.arguments import ensure_type
-from ..inputs.settings import hint, shorten
-from ..machines.protocol import Array, Integers
+from ballplate.simulator.design.objects import Volume
+from ballplate.simulator.inputs.arguments import ensure_type
+from ballplate.simulator.inputs.settings import hint, shorten
+from ballplate.simulator.machines.protocol import Array, Integers
 
 AXES = ("x", "y", "z")
 

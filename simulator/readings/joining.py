@@ -6,9 +6,8 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator
 
 import numpy as np
-
-from ..design.arrays import Design, Readings, UnmatchedReadingsError, ensure_rows
-from ..machines.protocol import Array, Integers
+from ballplate.simulator.design.arrays import Design, Readings, UnmatchedReadingsError, ensure_rows
+from ballplate.simulator.machines.protocol import Array, Integers
 
 # Indices of the position, the ball and the probe of a reading.
 ReadingKey = tuple[int, int, int]

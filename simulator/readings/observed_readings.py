@@ -7,14 +7,14 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from ballplate.simulator.design.arrays import Design, Readings, ensure_rows, in_sequence
+from ballplate.simulator.design.observations.lengths import Lengths
+from ballplate.simulator.estimation.spheres import fit_sphere
+from ballplate.simulator.inputs.extensions import MissingExtensionError, service
+from ballplate.simulator.inputs.settings import listing
+from ballplate.simulator.inputs.yamltree import Mark
+from ballplate.simulator.machines.protocol import Array, Integers
 
-from ..design.arrays import Design, Readings, ensure_rows, in_sequence
-from ..design.observations.lengths import Lengths
-from ..estimation.spheres import fit_sphere
-from ..inputs.extensions import MissingExtensionError, service
-from ..inputs.settings import listing
-from ..inputs.yamltree import Mark
-from ..machines.protocol import Array, Integers
 from .joining import ReadingKey, reading_keys, rows_of
 
 # Directions of a gauge within this (rad) of the planned ones are taken as planned.

@@ -9,18 +9,24 @@ from pathlib import Path
 from typing import Any, TextIO
 
 import numpy as np
+from ballplate.simulator.design.arrays import Design, Readings, in_sequence, measured, nominal_state
+from ballplate.simulator.design.observations.readings import expected_readings
+from ballplate.simulator.experiment.readings_section import ReadingsSettings, no_settings
+from ballplate.simulator.inputs.extensions import optional_service, service
+from ballplate.simulator.inputs.messages import (
+    MORE_ERRORS,
+    MOST_MESSAGES,
+    ExperimentError,
+    Message,
+    refused,
+)
+from ballplate.simulator.inputs.settings import hint, listing, number_of
+from ballplate.simulator.inputs.spreadsheets import CsvWriter
+from ballplate.simulator.inputs.tables import FileRow
+from ballplate.simulator.inputs.units import LENGTH_UNITS
+from ballplate.simulator.inputs.yamltree import GivenText, Mark
+from ballplate.simulator.machines.protocol import Array, Integers
 
-from ..design.arrays import Design, Readings, in_sequence, measured, nominal_state
-from ..design.observations.readings import expected_readings
-from ..experiment.readings_section import ReadingsSettings, no_settings
-from ..inputs.extensions import optional_service, service
-from ..inputs.messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message, refused
-from ..inputs.settings import hint, listing, number_of
-from ..inputs.spreadsheets import CsvWriter
-from ..inputs.tables import FileRow
-from ..inputs.units import LENGTH_UNITS
-from ..inputs.yamltree import GivenText, Mark
-from ..machines.protocol import Array, Integers
 from .joining import ReadingKey, reading_keys, rows_of
 from .observed_readings import ObservedReadings, combine_standards
 from .reading_sources import Source, source_rows

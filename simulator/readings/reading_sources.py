@@ -11,17 +11,22 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-
-from ..design.arrays import Design
-from ..experiment.readings_section import ReadingsSettings
-from ..geometry.motions import AXIS_NAMES
-from ..inputs.decoding import END_OF_FILE, refuse_long_lines, text_and_encoding
-from ..inputs.extensions import optional_service
-from ..inputs.messages import ExperimentError, Message, refused
-from ..inputs.settings import number_of
-from ..inputs.tables import FileRow, header_line, header_names, header_texts, read_table
-from ..inputs.units import Units
-from ..inputs.yamltree import GivenText, read_bytes
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.experiment.readings_section import ReadingsSettings
+from ballplate.simulator.geometry.motions import AXIS_NAMES
+from ballplate.simulator.inputs.decoding import END_OF_FILE, refuse_long_lines, text_and_encoding
+from ballplate.simulator.inputs.extensions import optional_service
+from ballplate.simulator.inputs.messages import ExperimentError, Message, refused
+from ballplate.simulator.inputs.settings import number_of
+from ballplate.simulator.inputs.tables import (
+    FileRow,
+    header_line,
+    header_names,
+    header_texts,
+    read_table,
+)
+from ballplate.simulator.inputs.units import Units
+from ballplate.simulator.inputs.yamltree import GivenText, read_bytes
 
 Source = Path | GivenText
 # Endings of workbooks, which an extension reads.

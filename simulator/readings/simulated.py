@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from ballplate.simulator.design.arrays import Design, Readings, State
+from ballplate.simulator.experiment.layout import lay_out
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.machines.protocol import Array, ErrorModel
+from ballplate.simulator.machines.truth import true_machine
 
-from ..design.arrays import Design, Readings, State
-from ..experiment.layout import lay_out
-from ..experiment.model import Experiment
-from ..inputs.messages import ExperimentError
-from ..machines.protocol import Array, ErrorModel
-from ..machines.truth import true_machine
 from .generate import (
     NoReadingError,
     exact_readings,

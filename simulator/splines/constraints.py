@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from ballplate.simulator.inputs.number_arrays import Array
 
-from ..inputs.number_arrays import Array
 from .space import SplineSpace
 
 NAMES = ("value", "slope", "second derivative", "third derivative")

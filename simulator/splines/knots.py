@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-
-from ..inputs.number_arrays import Array
+from ballplate.simulator.inputs.number_arrays import Array
 
 # With fewer points between a knot and a boundary the curvature, which jumps there, is hardly
 # determined.

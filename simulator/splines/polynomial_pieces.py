@@ -10,8 +10,8 @@ from __future__ import annotations
 from math import comb
 
 import numpy as np
+from ballplate.simulator.inputs.number_arrays import Array
 
-from ..inputs.number_arrays import Array
 from .spline_fit import SplineFit
 
 

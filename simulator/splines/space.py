@@ -12,8 +12,8 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
+from ballplate.simulator.inputs.number_arrays import Array
 
-from ..inputs.number_arrays import Array
 from .spline_problems import SplineError, SplineProblem
 
 Side = Literal["above", "below"]

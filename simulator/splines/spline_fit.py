@@ -12,10 +12,10 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
+from ballplate.simulator.computing.decompositions import svd
+from ballplate.simulator.inputs.number_arrays import Array
+from ballplate.simulator.inputs.settings import number_of
 
-from ..computing.decompositions import svd
-from ..inputs.number_arrays import Array
-from ..inputs.settings import number_of
 from .constraints import Constraint, rows
 from .space import Side, SplineSpace
 from .spline_problems import SplineError, SplineProblem

@@ -8,9 +8,9 @@ from collections.abc import Iterator
 from typing import get_args
 
 import numpy as np
+from ballplate.simulator.inputs.settings import listing
+from ballplate.simulator.machines.protocol import Integers, Unit
 
-from ...inputs.settings import listing
-from ...machines.protocol import Integers, Unit
 from .protocol import Disturbed, Influence, InfluenceParameter
 
 # Readings by which a kind is checked. More than there are axes, so that axes are not taken for

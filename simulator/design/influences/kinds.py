@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated
 
-from ...inputs.open_kinds import OpenKinds
+from ballplate.simulator.inputs.open_kinds import OpenKinds
+
 from .protocol import InfluenceSettings
 
 if TYPE_CHECKING:

@@ -15,11 +15,11 @@ from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
+from ballplate.simulator.inputs.messages import Steps
+from ballplate.simulator.inputs.settings import Settings
+from ballplate.simulator.inputs.units import Units
+from ballplate.simulator.machines.protocol import Array, Integers, Unit
 
-from ...inputs.messages import Steps
-from ...inputs.settings import Settings
-from ...inputs.units import Units
-from ...machines.protocol import Array, Integers, Unit
 from ..lookup import References
 from ..objects import Artefacts, Balls, Machine, Positions, Probes, Readings
 

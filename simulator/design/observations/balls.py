@@ -6,10 +6,10 @@ from abc import abstractmethod
 from typing import Protocol, Self
 
 import numpy as np
+from ballplate.simulator.computing.decompositions import svd
+from ballplate.simulator.inputs.number_arrays import Flags
+from ballplate.simulator.machines.protocol import Array, ErrorModel, Unit
 
-from ...computing.decompositions import svd
-from ...inputs.number_arrays import Flags
-from ...machines.protocol import Array, ErrorModel, Unit
 from ..arrays import Design, Observations, Replicates, Rows, State
 from .whitening import EXACT
 

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Self, cast
 
 import numpy as np
+from ballplate.simulator.geometry.ball_layouts import BallLayout
+from ballplate.simulator.machines.protocol import Array, ErrorModel, Unit
 
-from ...geometry.ball_layouts import BallLayout
-from ...machines.protocol import Array, ErrorModel, Unit
 from ..arrays import Design, Observations, State
 from .balls import BallObservations
 from .whitening import CovarianceRoot, at_least_exact

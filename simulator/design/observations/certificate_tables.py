@@ -8,11 +8,17 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from ballplate.simulator.inputs.messages import ExperimentError, Steps
+from ballplate.simulator.inputs.settings import shorten
+from ballplate.simulator.inputs.tables import (
+    FileRow,
+    TableLine,
+    header_cells,
+    read_table,
+    table_lines,
+)
+from ballplate.simulator.machines.protocol import Array
 
-from ...inputs.messages import ExperimentError, Steps
-from ...inputs.settings import shorten
-from ...inputs.tables import FileRow, TableLine, header_cells, read_table, table_lines
-from ...machines.protocol import Array
 from ..lookup import References
 
 STANDARD, EXPANDED, FACTOR = "standard_uncertainty", "expanded_uncertainty", "k"

@@ -7,16 +7,16 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal, get_args
 
 import numpy as np
+from ballplate.simulator.geometry.ball_layouts import BallLayout, BallNames, Name, frozen
+from ballplate.simulator.geometry.motions import AXIS_NAMES
+from ballplate.simulator.geometry.positions import Axis
+from ballplate.simulator.inputs.messages import Steps
+from ballplate.simulator.inputs.quantity_types import LengthUncertainty
+from ballplate.simulator.inputs.settings import Forms, Text, hint, listing
+from ballplate.simulator.machines.protocol import Array, Integers
 from numpy.typing import NDArray
 from pydantic import Field
 
-from ...geometry.ball_layouts import BallLayout, BallNames, Name, frozen
-from ...geometry.motions import AXIS_NAMES
-from ...geometry.positions import Axis
-from ...inputs.messages import Steps
-from ...inputs.quantity_types import LengthUncertainty
-from ...inputs.settings import Forms, Text, hint, listing
-from ...machines.protocol import Array, Integers
 from ..arrays import Design
 from ..lookup import References
 from .balls import BallObservations

@@ -6,16 +6,16 @@ from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
 import numpy as np
+from ballplate.simulator.geometry.ball_layouts import COINCIDENT, BallLayout, Name, frozen, pairs
+from ballplate.simulator.inputs.messages import Steps
+from ballplate.simulator.inputs.quantities import LengthFunction
+from ballplate.simulator.inputs.quantity_types import PositiveLength, UncertaintyFunction
+from ballplate.simulator.inputs.settings import Forms, NonEmpty, Settings, Text, hint, listing
+from ballplate.simulator.inputs.yamltree import mark_of
+from ballplate.simulator.machines.protocol import Array, Integers
 from numpy.typing import NDArray
 from pydantic import Field
 
-from ...geometry.ball_layouts import COINCIDENT, BallLayout, Name, frozen, pairs
-from ...inputs.messages import Steps
-from ...inputs.quantities import LengthFunction
-from ...inputs.quantity_types import PositiveLength, UncertaintyFunction
-from ...inputs.settings import Forms, NonEmpty, Settings, Text, hint, listing
-from ...inputs.yamltree import mark_of
-from ...machines.protocol import Array, Integers
 from ..arrays import Design, Words
 from ..lookup import References
 from .balls import BallObservations

@@ -13,10 +13,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from ballplate.simulator.computing.decompositions import svd
+from ballplate.simulator.inputs.number_arrays import Flags
+from ballplate.simulator.machines.protocol import Array, Integers
 
-from ...computing.decompositions import svd
-from ...inputs.number_arrays import Flags
-from ...machines.protocol import Array, Integers
 from .whitening import Whitening, whitening
 
 # Displacements that change lengths by less than this, compared with what changes them most, count

@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
+from ballplate.simulator.inputs.number_arrays import Flags
+from ballplate.simulator.machines.protocol import Array, Integers, Unit
 
-from ...inputs.number_arrays import Flags
-from ...machines.protocol import Array, Integers, Unit
 from ..arrays import Design, Replicates, Rows, State
 from .balls import BallObservations
 from .whitening import EXACT, CovarianceRoot

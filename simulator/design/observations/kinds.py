@@ -9,10 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Annotated, Any, Union, get_args
 
-from ...inputs.extensions import provided
-from ...inputs.messages import Steps
-from ...inputs.open_kinds import OpenKinds
-from ...inputs.settings import Settings
+from ballplate.simulator.inputs.extensions import provided
+from ballplate.simulator.inputs.messages import Steps
+from ballplate.simulator.inputs.open_kinds import OpenKinds
+from ballplate.simulator.inputs.settings import Settings
+
 from ..lookup import References
 from .calibration import Calibration
 from .coordinates import CoordinatesSettings, read_coordinates

@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
+from ballplate.simulator.inputs.number_arrays import Flags
+from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers
 
-from ...inputs.number_arrays import Flags
-from ...machines.protocol import Array, ErrorModel, Integers
 from ..arrays import Design, Observations, Rows, State, locations, reading_noise
 from ..parameters import SharedLayout, shared_layout
 from .joint_lengths import LengthArrays, LengthWhitening, length_whitening_of

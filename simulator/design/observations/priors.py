@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
+from ballplate.simulator.geometry.motions import vector_from_rotation, vector_rate
+from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers, Unit
 
-from ...geometry.motions import vector_from_rotation, vector_rate
-from ...machines.protocol import Array, ErrorModel, Integers, Unit
 from ..arrays import Design, Observations, Rows, State, Words
 from ..objects import Flags
 from ..parameters import shared_layout

@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from ballplate.simulator.geometry.artefacts import BryanGaugeSettings
+from ballplate.simulator.geometry.ball_layouts import BallLayout, Name
+from ballplate.simulator.inputs.messages import Steps
+from ballplate.simulator.inputs.quantity_types import LengthUncertainty, PositiveLength
+from ballplate.simulator.inputs.settings import Settings
+from ballplate.simulator.machines.protocol import Array, ErrorModel
 from pydantic import Field
 
-from ...geometry.artefacts import BryanGaugeSettings
-from ...geometry.ball_layouts import BallLayout, Name
-from ...inputs.messages import Steps
-from ...inputs.quantity_types import LengthUncertainty, PositiveLength
-from ...inputs.settings import Settings
-from ...machines.protocol import Array, ErrorModel
 from ..arrays import Design, State
 from ..lookup import References
 from .calibration import FAR_FROM_DRAWING, Calibration, CertifiedValue, far_from_drawing

@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from ballplate.simulator.geometry.motions import cross_matrices, pose_size
+from ballplate.simulator.machines.protocol import Array, ErrorModel
 
-from ...geometry.motions import cross_matrices, pose_size
-from ...machines.protocol import Array, ErrorModel
 from ..arrays import (
     Design,
     Readings,

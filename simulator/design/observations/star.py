@@ -15,10 +15,10 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
+from ballplate.simulator.computing.decompositions import lstsq, svd
+from ballplate.simulator.geometry.motions import AXIS_NAMES
+from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers
 
-from ...computing.decompositions import lstsq, svd
-from ...geometry.motions import AXIS_NAMES
-from ...machines.protocol import Array, ErrorModel, Integers
 from ..arrays import Design, Observations, Replicates, Rows, State
 from ..parameters import shared_layout
 from .readings import rotation_sensitivity

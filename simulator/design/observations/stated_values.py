@@ -11,15 +11,15 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
+from ballplate.simulator.inputs.extensions import optional_service
+from ballplate.simulator.inputs.messages import ExperimentError, Steps
+from ballplate.simulator.inputs.problems import Problems
+from ballplate.simulator.inputs.quantity_types import CommonPart
+from ballplate.simulator.inputs.settings import Settings, Text, hint, listing, shorten
+from ballplate.simulator.inputs.yamltree import Mark
+from ballplate.simulator.machines.protocol import Array
 from pydantic import Field
 
-from ...inputs.extensions import optional_service
-from ...inputs.messages import ExperimentError, Steps
-from ...inputs.problems import Problems
-from ...inputs.quantity_types import CommonPart
-from ...inputs.settings import Settings, Text, hint, listing, shorten
-from ...inputs.yamltree import Mark
-from ...machines.protocol import Array
 from ..lookup import References
 from .joint_values import MOST_JOINT_VALUES
 from .whitening import CovarianceRoot, IndefiniteError, covariance_root
@@ -270,7 +270,7 @@ def _of_file(
     """Return whether a CSV file has correlations, and its matrix (m, m) of the values with its
     rounding; or report faults.
     """
-    from ...inputs.covariances import read_matrix
+    from ballplate.simulator.inputs.covariances import read_matrix
 
     problems, place = references.problems, (*steps, "covariance")
     try:

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-
-from ...computing.decompositions import eigh
-from ...machines.protocol import Array, Integers
+from ballplate.simulator.computing.decompositions import eigh
+from ballplate.simulator.machines.protocol import Array, Integers
 
 
 @dataclass(frozen=True)
