@@ -46,7 +46,7 @@ from .results.fits import Fit as Fit
 from .results.prediction import Prediction as Prediction
 from .simulator.computing.processes import in_processes as in_processes
 from .simulator.design.arrays import Design as Design, Observations as Observations
-from .simulator.design.influences.protocol import Influence as Influence
+from .simulator.design.influence_quantities import Influence as Influence
 from .simulator.estimation.functions import (
     BallPlaces as BallPlaces,
     Coordinates as Coordinates,

@@ -17,7 +17,7 @@ from ballplate.simulator.design.arrays import (
     locations,
     nominal_state,
 )
-from ballplate.simulator.design.influences.protocol import Influence
+from ballplate.simulator.design.influence_quantities import Influence
 from ballplate.simulator.design.observations.balls import BallFunctions
 from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.gauss_newton import moved

@@ -81,8 +81,7 @@ def _run(options: argparse.Namespace) -> int:
     # Loaded only now, so that --help and wrong usage answer at once.
     from concurrent.futures import BrokenExecutor
 
-    from ballplate.simulator.computing.internal_error import InternalError
-    from ballplate.simulator.computing.memory import want_of_memory
+    from ballplate.simulator.computing.failures import InternalError, want_of_memory
     from ballplate.simulator.inputs.messages import ExperimentError, in_one_line
 
     try:

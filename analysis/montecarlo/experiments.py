@@ -13,9 +13,8 @@ from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.machines.joined import JoinedModel
-from ballplate.simulator.readings.generate import NoReadingError
-from ballplate.simulator.readings.simulated import on_stated_machine
+from ballplate.simulator.machines.truth import JoinedModel
+from ballplate.simulator.readings.generate import NoReadingError, on_stated_machine
 
 from .accumulator import Accumulator
 from .figures import MonteCarloOutcome, outcome, power_of_misfit

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.computing.processes import single_threaded
 from ballplate.simulator.design.arrays import Design, Rows, State, reading_noise
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.design.observations.readings import reading_blocks, reading_weights

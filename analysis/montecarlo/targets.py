@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.computing.processes import single_threaded
 from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.estimation.functions import (
     BallPlaces,

@@ -6,9 +6,8 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from ballplate.simulator.computing.processes import in_processes
+from ballplate.simulator.computing.processes import in_processes, single_threaded
 from ballplate.simulator.computing.steps import ProgressStep, Report, unreported
-from ballplate.simulator.computing.threads import single_threaded
 
 from .accumulator import Accumulator, accumulate
 from .figures import MonteCarloOutcome, outcome

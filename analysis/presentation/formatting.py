@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import fields, is_dataclass
 from typing import Any
 
-from ballplate.simulator.computing.rounding import printable
+from ballplate.simulator.computing.numerics import printable
 
 # Plain data, as JSON has it once `as_data` has made it so.
 Data = dict[str, Any]

@@ -9,8 +9,7 @@ parameters: those with most freedom first, equal ones in the order of names.
 from __future__ import annotations
 
 import numpy as np
-from ballplate.simulator.computing.decompositions import svd
-from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.computing.numerics import comparable, svd
 from ballplate.simulator.machines.protocol import Array, Integers
 
 

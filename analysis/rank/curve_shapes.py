@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from ballplate.simulator.computing.decompositions import lstsq
+from ballplate.simulator.computing.numerics import lstsq
 from ballplate.simulator.machines.protocol import Array
 
 # Highest degree of polynomial tried for a curve before it is called irregular.

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from ballplate.simulator.computing.decompositions import lstsq
-from ballplate.simulator.computing.rounding import above
+from ballplate.simulator.computing.numerics import above, lstsq
 from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.machines.protocol import Array
 

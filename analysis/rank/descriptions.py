@@ -5,7 +5,7 @@ artefacts, the motion of positions.
 from __future__ import annotations
 
 import numpy as np
-from ballplate.simulator.computing.rounding import above, comparable
+from ballplate.simulator.computing.numerics import above, comparable
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.machines.error_names import AXIS_ERRORS

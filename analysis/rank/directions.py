@@ -8,7 +8,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.simulator.computing.rounding import printable
+from ballplate.simulator.computing.numerics import printable
 from ballplate.simulator.inputs.settings import number_of
 from ballplate.simulator.machines.protocol import Unit
 

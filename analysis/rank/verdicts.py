@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from ballplate.simulator.computing.rounding import above
+from ballplate.simulator.computing.numerics import above
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.estimation.linearisation import Linearisation

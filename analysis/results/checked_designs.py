@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ballplate.rank.verdicts import verdict
-from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.computing.processes import single_threaded
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from ballplate.presentation.formatting import Data, as_data
-from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.computing.processes import single_threaded
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.machines.error_names import AXIS_ERRORS
 from ballplate.simulator.machines.protocol import Array, HasLines, Unit

@@ -6,15 +6,15 @@ from typing import Literal
 
 import numpy as np
 from ballplate.rank.verdicts import verdict
-from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.computing.processes import single_threaded
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.extensions import service
 from ballplate.simulator.machines.error_names import SquarenessError
 from ballplate.simulator.machines.kinematic import KinematicModel
+from ballplate.simulator.machines.metric import SpatialMetricModel
 from ballplate.simulator.machines.plane import PlaneModel
-from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 from ballplate.uncertainty.summaries import uncertainties
 

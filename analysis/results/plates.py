@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.simulator.computing.rounding import blank
+from ballplate.simulator.computing.numerics import blank
 from ballplate.simulator.estimation.covariance import MICROMETRE
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.experiment.model import Experiment

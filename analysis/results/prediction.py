@@ -13,7 +13,7 @@ from ballplate.presentation.formatting import Data, given
 from ballplate.presentation.result import Result
 from ballplate.presentation.table_columns import MainTable
 from ballplate.rank.verdicts import Verdict
-from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.computing.processes import single_threaded
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.inputs.extensions import optional_service, service

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.computing.numerics import comparable
 from ballplate.simulator.design.arrays import Design, Readings, measured, reading_noise
 from ballplate.simulator.design.observations.lengths import Lengths, length_deviations
 from ballplate.simulator.design.observations.readings import reading_blocks

@@ -19,7 +19,7 @@ from ballplate.presentation.formatting import (
 )
 from ballplate.presentation.table_columns import table_lines
 from ballplate.rank.verdicts import GREAT, Verdict
-from ballplate.simulator.computing.rounding import printable
+from ballplate.simulator.computing.numerics import printable
 from ballplate.simulator.inputs.settings import listing, number_of
 from ballplate.simulator.machines.protocol import Array
 from ballplate.uncertainty.scale import Scale

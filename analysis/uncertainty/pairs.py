@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from ballplate.simulator.computing.rounding import comparable, first_largest
+from ballplate.simulator.computing.numerics import comparable, first_largest
 from ballplate.simulator.estimation.functions import Displacements
 from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.inputs.number_arrays import Flags

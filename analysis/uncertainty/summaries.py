@@ -8,8 +8,8 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from ballplate.simulator.computing.rounding import first_largest
-from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.computing.numerics import first_largest
+from ballplate.simulator.computing.processes import single_threaded
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.functions import (
     BallPlaces,

@@ -23,7 +23,8 @@ from ballplate.simulator.experiment import (
     size_checks,
     variants,
 )
-from ballplate.simulator.geometry import artefacts, listed_directions
+from ballplate.simulator.geometry import artefacts
+from ballplate.simulator.geometry.axes import MOST_DIRECTIONS
 from ballplate.simulator.inputs import decoding, messages, settings, tables, yamltree
 from sphinx.application import Sphinx
 
@@ -53,7 +54,7 @@ LIMITS = {
         "correlated values of one calibration item": (joint_values.MOST_JOINT_VALUES,),
         "lengths of standards, one for each position and probe": (size_checks.MOST_LENGTHS,),
         "lengths of one standard that share balls": (size_checks.MOST_JOINT_LENGTHS,),
-        "directions of a gauge": (listed_directions.MOST_DIRECTIONS,),
+        "directions of a gauge": (MOST_DIRECTIONS,),
         "evaluation points": (sections.MOST_POINTS,),
         "evaluation points times axes times machine errors": (size_checks.MOST_DERIVATIVES,),
         "measuring tasks": (settings.MOST_SEVERAL,),

@@ -1,4 +1,9 @@
-"""Distribution of work over processes of this machine."""
+"""Processes and their threads, so that the same seed gives the same bits whatever their number.
+
+The matrices of an elimination have about a hundred columns. Several threads save little time on an
+idle machine and lose a hundredfold on a busy one, where the threads wait for each other; and the
+order of summation, with it the last bits of every result, would depend on their number.
+"""
 
 from __future__ import annotations
 
@@ -9,11 +14,14 @@ import threading
 import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
+from contextvars import ContextVar
 from copy import deepcopy
-from typing import Any, TypeVar
+from functools import cache, wraps
+from typing import Any, ParamSpec, TypeVar
 
 from ballplate.simulator.inputs.module_finder import OwnModules, own_modules
+from threadpoolctl import ThreadpoolController
 
 from .signals import SAFE_PATH
 
@@ -205,3 +213,53 @@ def processors() -> int:
     """Number of processors that this process may use."""
     allowed = getattr(os, "sched_getaffinity", None)
     return len(allowed(0)) if allowed is not None else os.cpu_count() or 1
+
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+SCIPY = "scipy.linalg"
+
+# What the outermost single-threaded function under way restores at its end.
+_under_way: ContextVar[ExitStack | None] = ContextVar("_under_way", default=None)
+
+
+@cache
+def _controller(with_scipy: bool) -> ThreadpoolController:
+    """The libraries that are loaded: SciPy brings one of its own."""
+    return ThreadpoolController()
+
+
+def single_threaded(function: Callable[P, R]) -> Callable[P, R]:
+    """Run a function with one thread of linear algebra, and restore the earlier setting.
+
+    Functions that it calls import SciPy's linear algebra by `scipy_linalg`, if it is not loaded
+    from the start.
+    """
+
+    @wraps(function)
+    def limited(*arguments: P.args, **named: P.kwargs) -> R:
+        if _under_way.get() is not None:
+            return function(*arguments, **named)
+        with ExitStack() as stack:
+            stack.enter_context(_controller(SCIPY in sys.modules).limit(limits=1, user_api="blas"))
+            token = _under_way.set(stack)
+            try:
+                return function(*arguments, **named)
+            finally:
+                _under_way.reset(token)
+
+    return limited
+
+
+def scipy_linalg() -> Any:
+    """Return the module scipy.linalg, loaded on first use, and on one thread within a
+    single-threaded function.
+    """
+    is_new = SCIPY not in sys.modules
+    import scipy.linalg
+
+    stack = _under_way.get()
+    if is_new and stack is not None:
+        stack.enter_context(_controller(True).limit(limits=1, user_api="blas"))
+    return scipy.linalg

@@ -14,7 +14,7 @@ from .arrays import (
     reading_noise as reading_noise,
     reading_uncertainties as reading_uncertainties,
 )
-from .influences.protocol import (
+from .influence_quantities import (
     DesignParts as DesignParts,
     Disturbed as Disturbed,
     Influence as Influence,

@@ -17,7 +17,7 @@ from ballplate.simulator.inputs.own_code import error_text, own_frame
 from ballplate.simulator.inputs.unusable import UnusableError
 from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers, Unit
 
-from .influences.protocol import DesignParts, Disturbed, Influence, InfluenceParameter
+from .influence_quantities import DesignParts, Disturbed, Influence, InfluenceParameter
 from .noise import Noise
 from .objects import (
     Artefacts,

@@ -1,5 +1,4 @@
 # Public names of this package, each loaded from its module when it is first used.
-from .corrections import corrected_points as corrected_points, correction_rows as correction_rows
 from .covariance import EXACT as EXACT, MICROMETRE as MICROMETRE
 from .elimination import ALIKE as ALIKE, ROWS_AT_ONCE as ROWS_AT_ONCE
 from .functions import (
@@ -22,6 +21,8 @@ from .gauss_newton import (
     Solution as Solution,
     Status as Status,
     as_drawn as as_drawn,
+    corrected_points as corrected_points,
+    correction_rows as correction_rows,
     estimate as estimate,
     iterate as iterate,
     linearised_fit as linearised_fit,
@@ -37,4 +38,3 @@ from .linearisation import (
     Linearisation as Linearisation,
     linearise as linearise,
 )
-from .spheres import FLAT as FLAT, fit_sphere as fit_sphere

@@ -20,7 +20,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from ballplate.simulator.computing.threads import scipy_linalg, single_threaded
+from ballplate.simulator.computing.processes import scipy_linalg, single_threaded
 from ballplate.simulator.design.arrays import Design, Rows, State, ensure_rows
 from ballplate.simulator.design.observations.readings import reading_blocks, reading_weights
 from ballplate.simulator.design.parameters import SharedLayout

@@ -11,15 +11,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from ballplate.simulator.computing.rounding import blank
+from ballplate.simulator.computing.numerics import blank
 from ballplate.simulator.design.arrays import Design, State
 from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.quantities import Target
 from ballplate.simulator.machines.protocol import Array, Integers, Unit
 
-from .corrections import corrected_points, correction_rows
 from .covariance import MICROMETRE
+from .gauss_newton import corrected_points, correction_rows
 from .linearisation import LinearFunctions, Linearisation
 
 # Places whose derivatives by all shared parameters are formed at once.

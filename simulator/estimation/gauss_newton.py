@@ -6,20 +6,28 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from ballplate.simulator.computing.threads import scipy_linalg, single_threaded
+from ballplate.simulator.computing.processes import scipy_linalg, single_threaded
 from ballplate.simulator.design.arrays import Design, State
 from ballplate.simulator.design.observations.lengths import Lengths
+from ballplate.simulator.design.observations.readings import offset_sensitivity
 from ballplate.simulator.design.parameters import SharedLayout, shared_layout
 from ballplate.simulator.geometry.motions import rotation_from_vector
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.machines.protocol import Array, Integers
 
-from .covariance import Spectrum, no_spectrum, spectrum
+from .covariance import (
+    Spectrum,
+    in_order,
+    no_spectrum,
+    solve_balls,
+    solve_kept,
+    solve_shared,
+    spectrum,
+)
 from .elimination import Factor, eliminate
 from .graded import triangle
 from .implied_values import implied_count
 from .initial import initial_state
 from .linearisation import Linearisation, linearise
-from .substitution import in_order, solve_balls, solve_kept, solve_shared
 
 Status = Literal["converged", "not converged", "diverged"]
 
@@ -220,3 +228,35 @@ def moved(state: State, layout: SharedLayout, shared: Array, balls: Array) -> St
         state.lengths + shared[layout.lengths],
         state.influences + shared[layout.influences],
     )
+
+
+def corrected_points(design: Design, state: State, points: Array, probes: Integers) -> Array:
+    """Corrected points x + e(x, a, p) (m, d) for scale readings `points` (m, d) with probes of
+    indices (m,), metres.
+    """
+    return points + design.model.error(points, state.a, state.probes[probes])
+
+
+def correction_rows(
+    design: Design, layout: SharedLayout, state: State, points: Array, probes: Integers
+) -> Array:
+    """Derivative (m, d, s) of the corrected points by the shared parameters, estimated probe
+    offsets included.
+
+    `points` (m, d) are scale readings with probes of indices `probes` (m,).
+    """
+    offsets = state.probes[probes]
+    jacobian = design.model.jacobian(points, state.a, offsets)
+    rows = np.zeros((*jacobian.shape[:2], len(layout)))
+    rows[:, :, layout.model] = jacobian
+    if not design.probes.free.any():
+        return rows
+    by_offset = offset_sensitivity(design.model, points, state.a, offsets)
+    for probe in np.unique(probes):
+        estimated = layout.offset_columns[probe] >= 0
+        members = np.flatnonzero(probes == probe)
+        columns = layout.offset_columns[probe][estimated]
+        rows[members[:, None, None], np.arange(rows.shape[1])[:, None], columns] = by_offset[
+            members
+        ][:, :, estimated]
+    return rows

@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from ballplate.simulator.computing.threads import scipy_linalg
+from ballplate.simulator.computing.processes import scipy_linalg
 from ballplate.simulator.machines.protocol import Array, Integers
 
 # Rows that are collected, in multiples of the columns, before they are brought to a triangle.

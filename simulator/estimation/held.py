@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.computing.processes import single_threaded
 from ballplate.simulator.machines.protocol import Integers
 
-from .covariance import spectrum
+from .covariance import in_order, spectrum
 from .elimination import Factor
 from .graded import triangle
 from .linearisation import Linearisation
-from .substitution import in_order
 
 
 @single_threaded

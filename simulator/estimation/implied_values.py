@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from ballplate.simulator.computing.decompositions import eigvalsh
+from ballplate.simulator.computing.numerics import eigvalsh
 from ballplate.simulator.design.arrays import Design, State
 from ballplate.simulator.design.observations.balls import BallObservations, slopes_apart
 from ballplate.simulator.machines.protocol import Array

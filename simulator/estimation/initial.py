@@ -10,20 +10,18 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from ballplate.simulator.computing.decompositions import lstsq, svd
-from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.computing.numerics import comparable, lstsq, svd
 from ballplate.simulator.design.arrays import Design, State, nominal_state
 from ballplate.simulator.design.objects import Flags
 from ballplate.simulator.design.observations.readings import seen_places
 from ballplate.simulator.geometry.motions import (
     fit_motion,
+    fit_sphere,
     rigid_motions,
     rotation_from_vector,
     vector_from_rotation,
 )
 from ballplate.simulator.machines.protocol import Array, Integers
-
-from .spheres import fit_sphere
 
 # Points whose spread across their main line is below this fraction of their length do not fix a
 # pose.

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from ballplate.simulator.computing.rounding import blank
-from ballplate.simulator.computing.threads import single_threaded
+from ballplate.simulator.computing.numerics import blank
+from ballplate.simulator.computing.processes import single_threaded
 from ballplate.simulator.design.arrays import Design, State, nominal_state
 from ballplate.simulator.design.parameters import SharedLayout, shared_layout
 from ballplate.simulator.machines.protocol import Array

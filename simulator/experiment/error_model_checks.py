@@ -8,7 +8,7 @@ from ballplate.simulator.design.lookup import References
 from ballplate.simulator.design.objects import Machine
 from ballplate.simulator.inputs.extensions import provided
 from ballplate.simulator.inputs.messages import ExperimentError, Steps
-from ballplate.simulator.machines.model_kinds import CustomModelError
+from ballplate.simulator.machines.protocol import CustomModelError
 from ballplate.simulator.machines.settings import (
     build_error_model,
     kind_of,

@@ -13,8 +13,13 @@ from ballplate.simulator.design.arrays import (
     locations,
     nominal_state,
 )
-from ballplate.simulator.design.influences.checks import few, wrong_of_parameters, wrong_of_shifts
-from ballplate.simulator.design.influences.protocol import InfluenceParameter, InfluenceSettings
+from ballplate.simulator.design.influence_quantities import (
+    InfluenceParameter,
+    InfluenceSettings,
+    few,
+    wrong_of_parameters,
+    wrong_of_shifts,
+)
 from ballplate.simulator.design.lookup import References
 from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.inputs.messages import ExperimentError

@@ -7,8 +7,7 @@ from __future__ import annotations
 from collections.abc import Collection
 
 import numpy as np
-from ballplate.simulator.computing.decompositions import svd
-from ballplate.simulator.computing.rounding import comparable
+from ballplate.simulator.computing.numerics import comparable, svd
 from ballplate.simulator.design.arrays import Design, Observations, Readings
 from ballplate.simulator.design.objects import (
     Artefacts,

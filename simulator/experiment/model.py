@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from ballplate.simulator.design.influences.protocol import InfluenceSettings
+from ballplate.simulator.design.influence_quantities import InfluenceSettings
 from ballplate.simulator.design.lookup import Indices
 from ballplate.simulator.design.noise import Noise
 from ballplate.simulator.design.objects import Machine

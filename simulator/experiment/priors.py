@@ -14,8 +14,7 @@ from ballplate.simulator.inputs.number_arrays import Array
 from ballplate.simulator.inputs.quantities import PARSERS, QuantityError
 from ballplate.simulator.inputs.settings import hint, shorten
 from ballplate.simulator.inputs.yamltree import mark_of
-from ballplate.simulator.machines.model_kinds import CustomModelError
-from ballplate.simulator.machines.protocol import ErrorModel, Unit
+from ballplate.simulator.machines.protocol import CustomModelError, ErrorModel, Unit
 from ballplate.simulator.machines.settings import build_error_model, kind_of
 
 from .model import Position, Prior, Probe

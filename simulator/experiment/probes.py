@@ -10,7 +10,7 @@ import numpy as np
 from ballplate.simulator.design.lookup import References, lengths_per_axis
 from ballplate.simulator.design.observations.star import Star
 from ballplate.simulator.geometry.ball_layouts import frozen
-from ballplate.simulator.geometry.rotations import rotation_matrix
+from ballplate.simulator.geometry.motions import rotation_matrix
 from ballplate.simulator.inputs.messages import ExperimentError, Steps
 from ballplate.simulator.inputs.number_arrays import Array
 from ballplate.simulator.inputs.settings import hint, listing

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, Self
 
-from ballplate.simulator.design.influences.kinds import AnyInfluence
+from ballplate.simulator.design.influence_quantities import AnyInfluence
 from ballplate.simulator.design.noise import Distribution, NoiseSettings
 from ballplate.simulator.design.observations.kinds import CalibrationSettings
 from ballplate.simulator.geometry.artefacts import ARTEFACTS, AnyArtefactSettings

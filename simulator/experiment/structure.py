@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import Annotated, Any
 
-from ballplate.simulator.design.influences.kinds import AnyInfluence
+from ballplate.simulator.design.influence_quantities import AnyInfluence
 from ballplate.simulator.design.observations.kinds import CalibrationSettings
 from ballplate.simulator.geometry.artefacts import AnyArtefactSettings
 from ballplate.simulator.inputs.extensions import MissingExtensionError, names, provided

@@ -15,18 +15,21 @@ from .ball_layouts import (
     ArtefactSettings as ArtefactSettings,
     BallLayout as BallLayout,
     Name as Name,
+    even_grid as even_grid,
     frozen as frozen,
     pairs as pairs,
 )
-from .grids import even_grid as even_grid
 from .motions import (
     AXIS_NAMES as AXIS_NAMES,
+    FLAT as FLAT,
     cross_matrices as cross_matrices,
     fit_motion as fit_motion,
+    fit_sphere as fit_sphere,
     fixes_pose as fixes_pose,
     pose_size as pose_size,
     rigid_motions as rigid_motions,
     rotation_from_vector as rotation_from_vector,
+    rotation_matrix as rotation_matrix,
     vector_from_rotation as vector_from_rotation,
     without_rigid_motion as without_rigid_motion,
 )
@@ -42,4 +45,3 @@ from .positions import (
     nominal_pose as nominal_pose,
     plane_rotation as plane_rotation,
 )
-from .rotations import rotation_matrix as rotation_matrix

@@ -13,6 +13,7 @@ from ballplate.simulator.inputs.open_kinds import OpenKinds
 from ballplate.simulator.inputs.quantity_types import PositiveLength
 from pydantic import Discriminator, Field, Tag, model_validator
 
+from .axes import DIRECTIONS, DirectionsSettings, directions
 from .ball_layouts import (
     MOST_BALLS,
     ArtefactSettings,
@@ -22,7 +23,6 @@ from .ball_layouts import (
     Name,
     frozen,
 )
-from .listed_directions import DIRECTIONS, DirectionsSettings, directions
 
 
 class GridSettings(ArtefactSettings):

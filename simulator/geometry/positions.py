@@ -11,7 +11,7 @@ from ballplate.simulator.inputs.number_arrays import Array
 from ballplate.simulator.inputs.room_parts import Place, RoomPart
 
 from .ball_layouts import BallLayout
-from .rotations import rotation_matrix
+from .motions import rotation_matrix
 
 Axis = Literal["x", "y", "z"]
 

@@ -1,8 +1,10 @@
 # Public names of this package, each loaded from its module when it is first used.
-from .arrangement import ARRANGEMENTS as ARRANGEMENTS, AXES as AXES, Arrangement as Arrangement
-from .arrangement_settings import (
+from .arrangement import (
     ARRANGEMENT as ARRANGEMENT,
+    ARRANGEMENTS as ARRANGEMENTS,
+    AXES as AXES,
     PRODUCTS as PRODUCTS,
+    Arrangement as Arrangement,
     ArrangementName as ArrangementName,
     ArrangementSettings as ArrangementSettings,
     arrangement_of as arrangement_of,
@@ -30,16 +32,19 @@ from .kinematic import (
     error_function as error_function,
 )
 from .kinematic_settings import KinematicSettings as KinematicSettings
-from .metric import MetricModel as MetricModel, Scale as Scale
-from .model_kinds import (
-    Corner as Corner,
-    CustomModelError as CustomModelError,
-    ErrorModelKind as ErrorModelKind,
+from .metric import (
+    MetricModel as MetricModel,
+    Scale as Scale,
+    SpatialMetricModel as SpatialMetricModel,
+    parameters_of_metric as parameters_of_metric,
 )
 from .plane import PlaneModel as PlaneModel, in_space as in_space
 from .protocol import (
     Array as Array,
+    Corner as Corner,
+    CustomModelError as CustomModelError,
     ErrorModel as ErrorModel,
+    ErrorModelKind as ErrorModelKind,
     HasLines as HasLines,
     Integers as Integers,
     Line as Line,
@@ -54,9 +59,5 @@ from .settings import (
     MetricSettings as MetricSettings,
     build_error_model as build_error_model,
     kind_of as kind_of,
-)
-from .spatial_metric import (
-    SpatialMetricModel as SpatialMetricModel,
-    parameters_of_metric as parameters_of_metric,
 )
 from .true_machine_settings import FurtherTrueMachine as FurtherTrueMachine

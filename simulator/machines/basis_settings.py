@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, Literal, Self
 
 from ballplate.simulator.inputs.settings import Forms, Settings
-from ballplate.simulator.splines.knots import with_boundaries
+from ballplate.simulator.splines.space import with_boundaries
 from pydantic import Field, model_validator
 
 from .bases import Basis, Ends, Monomial, Polynomial, Spline

@@ -15,7 +15,7 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
-from ballplate.simulator.geometry.grids import even_grid
+from ballplate.simulator.geometry.ball_layouts import even_grid
 from ballplate.simulator.geometry.motions import cross_matrices
 
 from .protocol import Array, Line, Parameter, Reported, Unit

@@ -11,8 +11,7 @@ from pydantic import ConfigDict, Discriminator, Field, Tag, model_validator
 from .bases import Basis
 from .basis_settings import BASIS, BasisSettings, SplineSettings, basis_of, without
 from .empirical import empirical_model
-from .model_kinds import Corner, ErrorModelKind
-from .protocol import ErrorModel
+from .protocol import Corner, ErrorModel, ErrorModelKind
 from .terms import (
     VARIABLES,
     WITH_CONSTANT,

@@ -8,20 +8,13 @@ from ballplate.simulator.inputs.messages import Steps
 from ballplate.simulator.inputs.settings import Forms, Settings
 from pydantic import Field, create_model, model_validator
 
-from .arrangement_settings import (
-    ARRANGEMENT,
-    PRODUCTS,
-    ArrangementName,
-    ArrangementSettings,
-    arrangement_of,
-)
+from .arrangement import ARRANGEMENT, PRODUCTS, ArrangementName, ArrangementSettings, arrangement_of
 from .bases import Basis
 from .basis_settings import BASIS, BasisSettings, SplineSettings, basis_of, without
 from .error_names import AXIS_ERRORS
 from .kinematic import in_plane, kinematic_model_of
-from .model_kinds import Corner, ErrorModelKind
 from .plane import PlaneModel, in_space
-from .protocol import ErrorModel
+from .protocol import Corner, ErrorModel, ErrorModelKind
 
 _Function = Forms[Annotated[int, Field(ge=1, le=30)], SplineSettings, SplineSettings]
 FunctionsSettings = create_model(

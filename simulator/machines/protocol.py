@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Literal, Protocol, runtime_checkable
+from pathlib import Path
+from typing import Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
+from ballplate.simulator.inputs.messages import Steps
 from ballplate.simulator.inputs.number_arrays import Array, Integers as Integers
+from ballplate.simulator.inputs.settings import Settings
+from ballplate.simulator.inputs.trust import Trust
+from ballplate.simulator.inputs.unusable import UnusableError
 
 Unit = Literal["m", "rad", "1", "K", "1/K", "m/h", "1/h"]
 
@@ -121,3 +127,34 @@ class HasLines(Protocol):
     def lines(self, function: str, t: Array) -> tuple[Line, ...]:
         """Return the function at fractions t (m,) of lines through the volume, or of its axis."""
         ...
+
+
+Corner = tuple[float, ...]
+
+
+class CustomModelError(UnusableError, ValueError):
+    """A user's error model is unusable; `key` is the key at fault, "object" or "options"."""
+
+    def __init__(self, text: str, key: str = "object") -> None:
+        self.key = key
+        super().__init__(text)
+
+
+@dataclass(frozen=True)
+class ErrorModelKind:
+    """A type of error model.
+
+    `build` makes the model from `settings` for a volume between two corners in metres;
+    `dimensions` lists the possible numbers of co-ordinates. `wrong` returns faults of the settings
+    for a number of dimensions as (path in the settings, text) pairs; `with_defaults` states
+    defaults that depend on this number. `read` completes the settings from files, found from the
+    folder of the experiment; it raises ExperimentError. What `is_code` is run to be built.
+    """
+
+    settings: type[Settings]
+    build: Callable[[Any, Corner, Corner], ErrorModel]
+    dimensions: tuple[int, ...] = (2, 3)
+    wrong: Callable[[Any, int], Iterable[tuple[Steps, str]]] = lambda settings, dimension: ()
+    with_defaults: Callable[[Any, int], Settings] = lambda settings, dimension: settings
+    read: Callable[[Any, Path, Trust], None] = lambda settings, folder, trust: None
+    is_code: bool = False

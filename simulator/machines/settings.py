@@ -16,10 +16,8 @@ from pydantic import Field
 
 from .empirical_settings import EMPIRICAL
 from .kinematic_settings import KINEMATIC
-from .metric import MetricModel, Scale
-from .model_kinds import Corner, ErrorModelKind
-from .protocol import ErrorModel
-from .spatial_metric import SpatialMetricModel
+from .metric import MetricModel, Scale, SpatialMetricModel
+from .protocol import Corner, ErrorModel, ErrorModelKind
 
 
 class MetricSettings(Settings):

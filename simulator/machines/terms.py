@@ -14,7 +14,7 @@ from itertools import product
 from typing import Literal
 
 import numpy as np
-from ballplate.simulator.geometry.grids import even_grid
+from ballplate.simulator.geometry.ball_layouts import even_grid
 
 from .bases import Basis, Monomial, Quoted, Spline, whole_values
 from .protocol import Array

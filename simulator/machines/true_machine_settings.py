@@ -9,8 +9,7 @@ from ballplate.simulator.inputs.quantity_types import Angle, PositiveLength
 from ballplate.simulator.inputs.settings import Settings
 from pydantic import Field
 
-from .model_kinds import Corner
-from .protocol import ErrorModel, TrueMachine
+from .protocol import Corner, ErrorModel, TrueMachine
 from .settings import ErrorModelSettings, with_defaults
 
 

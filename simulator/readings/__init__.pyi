@@ -2,14 +2,21 @@
 from .fingerprints import fingerprint as fingerprint, position_fingerprints as position_fingerprints
 from .generate import (
     NoReadingError as NoReadingError,
+    Simulated as Simulated,
     exact_readings as exact_readings,
     noisy_certificate as noisy_certificate,
     noisy_readings as noisy_readings,
+    on_stated_machine as on_stated_machine,
     scale_readings as scale_readings,
+    simulated_readings as simulated_readings,
+    too_large as too_large,
 )
 from .given_points import ensure_points as ensure_points, probe_places as probe_places
-from .joining import joined as joined
-from .observed_readings import ObservedReadings as ObservedReadings, observe as observe
+from .observed_readings import (
+    ObservedReadings as ObservedReadings,
+    joined as joined,
+    observe as observe,
+)
 from .reading_files import AXES as AXES, read_readings as read_readings
 from .reading_sources import (
     Source as Source,
@@ -19,10 +26,4 @@ from .reading_sources import (
     is_plain as is_plain,
     named_rows as named_rows,
     plain_rows as plain_rows,
-)
-from .simulated import (
-    Simulated as Simulated,
-    on_stated_machine as on_stated_machine,
-    simulated_readings as simulated_readings,
-    too_large as too_large,
 )

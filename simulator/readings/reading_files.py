@@ -27,8 +27,13 @@ from ballplate.simulator.inputs.units import LENGTH_UNITS
 from ballplate.simulator.inputs.yamltree import GivenText, Mark
 from ballplate.simulator.machines.protocol import Array, Integers
 
-from .joining import ReadingKey, reading_keys, rows_of
-from .observed_readings import ObservedReadings, combine_standards
+from .observed_readings import (
+    ObservedReadings,
+    ReadingKey,
+    combine_standards,
+    reading_keys,
+    rows_of,
+)
 from .reading_sources import Source, source_rows
 
 AXES = ("x", "y", "z")

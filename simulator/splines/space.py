@@ -7,6 +7,7 @@ The abscissa is scaled to [0, 1] inside, so that neither its unit nor its origin
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
@@ -14,7 +15,34 @@ from typing import Literal
 import numpy as np
 from ballplate.simulator.inputs.number_arrays import Array
 
-from .spline_problems import SplineError, SplineProblem
+
+@dataclass(frozen=True)
+class SplineProblem:
+    """A fault and its remedy; `text` has {0}, {1}, … for the `places`, in metres or radians."""
+
+    text: str
+    places: tuple[float, ...] = ()
+
+    def told(self, place: Callable[[float], str]) -> str:
+        """Return the text with each location written by `place`.
+
+        >>> SplineProblem("nothing beyond {0}", (0.25,)).told(lambda x: f"{1000 * x:g} mm")
+        'nothing beyond 250 mm'
+        """
+        return self.text.format(*map(place, self.places))
+
+
+class SplineError(ValueError):
+    """A spline is impossible, undetermined, or evaluated outside its range; `problems` has all
+    reasons.
+    """
+
+    def __init__(self, problems: Iterable[SplineProblem]) -> None:
+        self.problems = tuple(problems)
+        super().__init__(
+            "; ".join(problem.told(lambda place: f"{place:g}") for problem in self.problems)
+        )
+
 
 Side = Literal["above", "below"]
 """From which side a derivative is taken where it jumps."""
@@ -135,3 +163,54 @@ class SplineSpace:
             factor = float(np.prod(np.arange(k - derivative + 1, k + 1)))
             row_values = row_values * u + factor * self.pieces[piece, k]
         return row_values / self.length**derivative
+
+
+# With fewer points between a knot and a boundary the curvature, which jumps there, is hardly
+# determined.
+NEXT_TO_BOUNDARY = 3
+
+
+def at_every(
+    x: Array, r: int, lower: float, upper: float, boundaries: Sequence[float] = ()
+) -> tuple[float, ...]:
+    """Return knots at every r-th of the points x between neighbouring boundaries, as in NISTIR
+    6517, equation (5).
+
+    A knot without a point of its feature beyond it would be undetermined, and is omitted. So is
+    one with fewer than three points from it to a boundary, the knot's own not counted. Points of
+    the same x count as one, a point on a boundary in both features.
+
+    >>> at_every(np.arange(1.0, 9.0), 3, 1.0, 8.0)
+    (3.0, 6.0)
+    >>> at_every(np.arange(1.0, 17.0), 3, 1.0, 16.0, [8.0])
+    (3.0, 13.0)
+    >>> at_every(np.arange(1.0, 17.0), 5, 1.0, 16.0, [8.0])
+    (5.0, 12.0)
+    """
+    distinct = np.unique(x)
+    knots_found = []
+    ends = [lower, *boundaries, upper]
+    for start, end in zip(ends, ends[1:], strict=False):
+        inside = distinct[(distinct >= start) & (distinct <= end)]
+        before = 0 if start == lower else NEXT_TO_BOUNDARY
+        beyond = 1 if end == upper else NEXT_TO_BOUNDARY
+        chosen = range(r - 1, len(inside) - beyond, r)
+        knots_found += [float(inside[k]) for k in chosen if k >= before and start < inside[k] < end]
+    return tuple(knots_found)
+
+
+def with_boundaries(
+    knots: Sequence[float],
+    boundaries: Sequence[float],
+    order: int,
+    corners: Sequence[float] = (),
+) -> tuple[float, ...]:
+    """Return all knots in order, with multiplicities for continuous value and slope at the
+    boundaries, and no continuity at the corners.
+
+    >>> with_boundaries((1.0, 3.0), (2.0,), 4)
+    (1.0, 2.0, 2.0, 3.0)
+    """
+    doubled = [boundary for boundary in boundaries for _ in range(order - 2)]
+    broken = [corner for corner in corners for _ in range(order)]
+    return tuple(sorted([*knots, *doubled, *broken]))

@@ -10,15 +10,61 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from math import comb
 
 import numpy as np
-from ballplate.simulator.computing.decompositions import svd
+from ballplate.simulator.computing.numerics import svd
 from ballplate.simulator.inputs.number_arrays import Array
 from ballplate.simulator.inputs.settings import number_of
 
-from .constraints import Constraint, rows
-from .space import Side, SplineSpace
-from .spline_problems import SplineError, SplineProblem
+from .space import Side, SplineError, SplineProblem, SplineSpace
+
+NAMES = ("value", "slope", "second derivative", "third derivative")
+
+
+@dataclass(frozen=True)
+class Constraint:
+    """A value (derivative 0), slope (1) or higher derivative at a point, in metres or radians (of
+    y) per metre or radian (of x) to some power. A derivative that jumps is that of the piece above.
+    """
+
+    at: float
+    derivative: int
+    value: float = 0.0
+
+    @property
+    def name(self) -> str:
+        """The quantity that is prescribed.
+
+        >>> Constraint(0.5, 1).name
+        'slope'
+        """
+        known = self.derivative < len(NAMES)
+        return NAMES[self.derivative] if known else f"derivative {self.derivative}"
+
+
+def straight(space: SplineSpace, lower: float, upper: float) -> tuple[Constraint, ...]:
+    """Return the conditions of a straight line: no curvature in any piece between two points."""
+    starts = [place for place in space.breaks[:-1].tolist() if lower <= place < upper]
+    return tuple(Constraint(place, k) for place in starts for k in range(2, space.order))
+
+
+def rows(space: SplineSpace, constraints: tuple[Constraint, ...]) -> tuple[Array, Array]:
+    """Return the matrix (m, count) and right-hand side (m,), each row scaled to length 1.
+
+    Zero rows, of derivatives that no spline of this order has, are unchanged.
+
+    :raises SplineError: a point beyond the ends.
+    """
+    matrix, values = np.zeros((len(constraints), space.count)), np.zeros(len(constraints))
+    for k, constraint in enumerate(constraints):
+        matrix[k] = space.rows(np.array([constraint.at]), constraint.derivative)[0]
+        # Whatever the unit of x, a slope's row then counts as much as a value's.
+        size = float(np.linalg.norm(matrix[k])) or 1.0
+        matrix[k] /= size
+        values[k] = constraint.value / size
+    return matrix, values
+
 
 # Rows of length 1, and columns of functions of size 1: what is smaller is rounding.
 NOTHING = 1e-10
@@ -174,3 +220,19 @@ def _runs(chosen: np.ndarray) -> list[tuple[int, int]]:
     """
     edges = np.flatnonzero(np.diff(np.concatenate([[0], chosen.astype(int), [0]])))
     return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def pieces(fitted: SplineFit, local: bool = True) -> Array:
+    """Return the coefficients (pieces, order) of 1, u, u², … between neighbouring `breaks` of the
+    fitted curve's space, in metres and radians: u is x less the start of the piece, or x.
+    """
+    space = fitted.space
+    coefficients = (space.pieces @ fitted.coefficients) * space.length ** -np.arange(space.order)
+    if local:
+        return coefficients
+    shifted = np.zeros_like(coefficients)
+    start = space.breaks[:-1]
+    for k in range(space.order):
+        for j in range(k + 1):
+            shifted[:, j] += coefficients[:, k] * comb(k, j) * (-start) ** (k - j)
+    return shifted

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from ballplate.results.adjustments import adjusted
-from ballplate.simulator.machines.spatial_metric import SpatialMetricModel, parameters_of_metric
+from ballplate.simulator.machines.metric import SpatialMetricModel, parameters_of_metric
 
 MODEL = SpatialMetricModel(True, (0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
 

@@ -20,8 +20,8 @@ from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.axes import PlateAxes
 from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.readings.generate import simulated_readings
 from ballplate.simulator.readings.observed_readings import ObservedReadings
-from ballplate.simulator.readings.simulated import simulated_readings
 from numpy.typing import NDArray
 
 ANGLES = Path("designs/hocken_borchardt/angles.yaml")

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ballplate.simulator.computing import decompositions
+from ballplate.simulator.computing import numerics
 
 NAMES = ("svd", "eigh", "eigvalsh", "lstsq", "pinv")
 GENERATOR = np.random.default_rng(5)
@@ -44,7 +44,7 @@ def failures(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 @pytest.mark.parametrize("matrix", [WIDE, WIDE.T, SQUARE, POOR, STACK])
 @pytest.mark.parametrize("full", [True, False])
 def test_singular_vectors(matrix: Any, full: bool, failures: list[str]) -> None:
-    left, values, right = decompositions.svd(matrix, full_matrices=full)
+    left, values, right = numerics.svd(matrix, full_matrices=full)
     k = values.shape[-1]
     made = (left[..., :k] * values[..., None, :]) @ right[..., :k, :]
     np.testing.assert_allclose(made, matrix, atol=1e-12)
@@ -52,38 +52,36 @@ def test_singular_vectors(matrix: Any, full: bool, failures: list[str]) -> None:
     np.testing.assert_allclose(
         left.swapaxes(-1, -2) @ left, np.eye(left.shape[-1]) + 0 * left[..., :1, :1], atol=1e-12
     )
-    np.testing.assert_allclose(decompositions.svd(matrix, compute_uv=False), values, atol=1e-12)
+    np.testing.assert_allclose(numerics.svd(matrix, compute_uv=False), values, atol=1e-12)
     assert "svd" in failures
 
 
 @pytest.mark.parametrize("matrix", [POOR, COVARIANCES])
 def test_eigenvectors(matrix: Any, failures: list[str]) -> None:
-    values, vectors = decompositions.eigh(matrix)
+    values, vectors = numerics.eigh(matrix)
     np.testing.assert_allclose(matrix @ vectors, vectors * values[..., None, :], atol=1e-11)
     assert (np.diff(values) >= 0.0).all()
-    np.testing.assert_allclose(decompositions.eigvalsh(matrix), values, atol=1e-11)
+    np.testing.assert_allclose(numerics.eigvalsh(matrix), values, atol=1e-11)
     assert set(failures) == {"eigh", "eigvalsh"}
 
 
 def test_shortest_solutions_of_a_deficient_matrix(failures: list[str]) -> None:
-    solution, _, rank, _ = decompositions.lstsq(POOR, POOR[:, :2])
+    solution, _, rank, _ = numerics.lstsq(POOR, POOR[:, :2])
     assert rank == 4
     # The shortest one has no part in the null space, of which the wide matrix spans the rest.
     span = np.linalg.qr(WIDE.T)[0]
     np.testing.assert_allclose(POOR @ solution, POOR[:, :2], atol=1e-11)
     np.testing.assert_allclose(span @ (span.T @ solution), solution, atol=1e-11)
-    inverse = decompositions.pinv(WIDE)
+    inverse = numerics.pinv(WIDE)
     np.testing.assert_allclose(WIDE @ inverse, np.eye(4), atol=1e-12)
-    np.testing.assert_allclose(
-        decompositions.pinv(POOR, rcond=1e-9) @ POOR, span @ span.T, atol=1e-9
-    )
+    np.testing.assert_allclose(numerics.pinv(POOR, rcond=1e-9) @ POOR, span @ span.T, atol=1e-9)
     assert {"lstsq", "pinv"} <= set(failures)
 
 
 def test_what_no_routine_can_decompose_is_refused_as_before() -> None:
     for wrong in (np.nan, np.inf):
         with pytest.raises(np.linalg.LinAlgError):
-            decompositions.svd(np.full((3, 3), wrong))
+            numerics.svd(np.full((3, 3), wrong))
 
 
 def modules() -> Iterator[Path]:
@@ -96,7 +94,7 @@ def test_no_module_uses_the_first_routine_alone() -> None:
     allowed = {"norm", "qr", "inv", "solve", "cholesky", "det", "LinAlgError"}
     found = set()
     for path in modules():
-        if path.name in ("decompositions.py", "library_versions.py"):
+        if path.name in ("numerics.py", "library_versions.py"):
             continue
         text = path.read_text(encoding="utf-8")
         for node in ast.walk(ast.parse(text)) if "linalg" in text else ():

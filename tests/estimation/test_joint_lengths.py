@@ -31,7 +31,7 @@ from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.motions import rotation_from_vector
-from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
+from ballplate.simulator.machines.metric import SpatialMetricModel
 from ballplate.simulator.machines.truth import true_machine
 from ballplate.simulator.readings.generate import exact_readings, on_true_machine, true_artefacts
 from numpy.typing import NDArray

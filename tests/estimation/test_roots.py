@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from ballplate.simulator.computing.rounding import (
+from ballplate.simulator.computing.numerics import (
     comparable,
     first_largest,
     first_largest_of_columns,

@@ -17,11 +17,11 @@ from ballplate.simulator.geometry.motions import (
     pose_size,
     rigid_motions,
     rotation_from_vector,
+    rotation_matrix,
     vector_from_rotation,
     vector_rate,
     without_rigid_motion,
 )
-from ballplate.simulator.geometry.rotations import rotation_matrix
 from scipy.spatial.transform import Rotation
 
 from tests.geometry import wording

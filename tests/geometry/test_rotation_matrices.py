@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from ballplate.simulator.geometry.rotations import cosine_and_sine, rotation_matrix
+from ballplate.simulator.geometry.motions import cosine_and_sine, rotation_matrix
 from ballplate.simulator.inputs.quantities import parse_angle
 from hypothesis import given, strategies as st
 

@@ -10,16 +10,14 @@ from ballplate.extensions.machine_files.machine_file import load_machine
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS, Arrangement
 from ballplate.simulator.machines.bases import Monomial, Polynomial, Spline
 from ballplate.simulator.machines.empirical import empirical_model
-from ballplate.simulator.machines.joined import JoinedModel
 from ballplate.simulator.machines.kinematic import (
     in_plane,
     kinematic_model,
     kinematic_model_of,
 )
-from ballplate.simulator.machines.metric import MetricModel
+from ballplate.simulator.machines.metric import MetricModel, SpatialMetricModel
 from ballplate.simulator.machines.plane import PlaneModel
 from ballplate.simulator.machines.protocol import ErrorModel, HasLines
-from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
 from ballplate.simulator.machines.terms import (
     RADIAL,
     Radial,
@@ -29,6 +27,7 @@ from ballplate.simulator.machines.terms import (
     tensor,
     univariate,
 )
+from ballplate.simulator.machines.truth import JoinedModel
 from hypothesis import given, strategies as st
 
 from tests.reference.derivatives import assert_derivative, complex_step

@@ -18,9 +18,8 @@ from ballplate.simulator.machines.empirical import empirical_model
 from ballplate.simulator.machines.kinematic import (
     kinematic_model,
 )
-from ballplate.simulator.machines.metric import MetricModel
+from ballplate.simulator.machines.metric import MetricModel, SpatialMetricModel
 from ballplate.simulator.machines.protocol import ErrorModel
-from ballplate.simulator.machines.spatial_metric import SpatialMetricModel
 from ballplate.simulator.machines.terms import sums
 from ballplate.simulator.machines.true_machine_settings import CoefficientSettings
 from ballplate.simulator.machines.truth import TruthError, true_parameters

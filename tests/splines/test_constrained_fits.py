@@ -5,12 +5,8 @@ from __future__ import annotations
 import mpmath
 import numpy as np
 import pytest
-from ballplate.simulator.splines.constraints import Constraint, rows, straight
-from ballplate.simulator.splines.knots import at_every, with_boundaries
-from ballplate.simulator.splines.polynomial_pieces import pieces
-from ballplate.simulator.splines.space import SplineSpace
-from ballplate.simulator.splines.spline_fit import fit
-from ballplate.simulator.splines.spline_problems import SplineError
+from ballplate.simulator.splines.space import SplineError, SplineSpace, at_every, with_boundaries
+from ballplate.simulator.splines.spline_fit import Constraint, fit, pieces, rows, straight
 from hypothesis import given, settings, strategies as st
 from scipy.interpolate import CubicSpline, make_lsq_spline
 

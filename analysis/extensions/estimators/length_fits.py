@@ -19,9 +19,8 @@ from ballplate.results import (
 )
 from ballplate.simulator.computing import svd
 from ballplate.simulator.design import Design, Lengths, Priors
-from ballplate.simulator.estimation import FLAT, fit_sphere
 from ballplate.simulator.experiment import Experiment
-from ballplate.simulator.geometry import TwoSpheresSettings
+from ballplate.simulator.geometry import FLAT, TwoSpheresSettings, fit_sphere
 from ballplate.simulator.inputs import refused
 from ballplate.simulator.machines import Array, SpatialMetricModel
 from ballplate.simulator.readings import ObservedReadings

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from ballplate.simulator.computing import lstsq, svd
-from ballplate.simulator.estimation import FLAT, fit_sphere
+from ballplate.simulator.geometry import FLAT, fit_sphere
 from ballplate.simulator.machines import Array
 
 # Any sphere goes through four.

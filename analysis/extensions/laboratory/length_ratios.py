@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from ballplate.simulator.computing import svd
 from ballplate.simulator.design import Design, Lengths
-from ballplate.simulator.estimation import FLAT, fit_sphere
+from ballplate.simulator.geometry import FLAT, fit_sphere
 from ballplate.simulator.machines import Array
 
 # Departures of the factor from one that are doubtful, and that no machine has; a length that is

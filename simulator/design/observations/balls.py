@@ -6,7 +6,7 @@ from abc import abstractmethod
 from typing import Protocol, Self
 
 import numpy as np
-from ballplate.simulator.computing.decompositions import svd
+from ballplate.simulator.computing.numerics import svd
 from ballplate.simulator.inputs.number_arrays import Flags
 from ballplate.simulator.machines.protocol import Array, ErrorModel, Unit
 

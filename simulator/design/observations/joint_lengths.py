@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.simulator.computing.decompositions import svd
+from ballplate.simulator.computing.numerics import svd
 from ballplate.simulator.inputs.number_arrays import Flags
 from ballplate.simulator.machines.protocol import Array, Integers
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
-from ballplate.simulator.computing.decompositions import lstsq, svd
+from ballplate.simulator.computing.numerics import lstsq, svd
 from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers
 

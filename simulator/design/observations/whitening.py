@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.simulator.computing.decompositions import eigh
+from ballplate.simulator.computing.numerics import eigh
 from ballplate.simulator.machines.protocol import Array, Integers
 
 

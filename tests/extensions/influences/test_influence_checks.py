@@ -10,7 +10,7 @@ from typing import Any, ClassVar, Literal
 import ballplate as bp
 import numpy as np
 import pytest
-from ballplate.simulator.design.influences.protocol import (
+from ballplate.simulator.design.influence_quantities import (
     DesignParts,
     Disturbed,
     Influence,

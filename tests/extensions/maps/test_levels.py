@@ -21,7 +21,7 @@ from ballplate.extensions.maps.comparison import compared
 from ballplate.extensions.maps.normalised_errors import ValueDifference
 from ballplate.extensions.maps.shared_certificates import with_shared_certificates
 from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.geometry.grids import even_grid
+from ballplate.simulator.geometry.ball_layouts import even_grid
 from ballplate.simulator.machines.protocol import Array
 from scipy.stats import beta, norm, t as student
 

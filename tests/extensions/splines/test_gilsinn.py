@@ -9,7 +9,7 @@ import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.extensions.splines.error_curve import ErrorCurve
-from ballplate.simulator.splines.polynomial_pieces import pieces
+from ballplate.simulator.splines.spline_fit import pieces
 
 from tests.reference import truncated_powers
 

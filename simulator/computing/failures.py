@@ -1,9 +1,14 @@
-"""Messages about insufficient memory."""
+"""Failures that are not of the input: errors of the program itself, and lack of memory."""
 
 from __future__ import annotations
 
 import errno
 import re
+
+
+class InternalError(Exception):
+    """The program has found an error in itself; the message states the contradiction."""
+
 
 WITH_SIZE = re.compile(r"Unable to allocate ([0-9.]+ [KMGTPE]?i?B|[0-9]+ bytes)")
 
