@@ -136,7 +136,7 @@ def run(
     from dataclasses import replace
 
     from .montecarlo.trial_runs import MOST_TRIALS
-    from .results import checked_designs as study
+    from .results.checked_files import predict
 
     ensure_whole(2, MOST_TRIALS, trials=trials)
     ensure_whole(0, seed=seed)
@@ -146,7 +146,7 @@ def run(
     if trials is None and until is None and (seed is not None or workers != 1):
         raise ValueError("seed and workers apply to trials or until only; leave them out")
     chosen = experiment_of(experiment)
-    predicted = study.predict(chosen)
+    predicted = predict(chosen)
     if trials is None and until is None:
         return predicted
     from .montecarlo import experiments as replicates

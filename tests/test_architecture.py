@@ -30,7 +30,6 @@ ROOMS = (
     "simulator/splines",
     "simulator/machines",
     "simulator/design",
-    "simulator/maps",
     "simulator/experiment",
     "simulator/estimation",
     "simulator/readings",

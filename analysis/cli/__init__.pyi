@@ -25,8 +25,7 @@ from .common import (
     write_picture as write_picture,
 )
 from .dispatch import main as main
-from .excerpts import print_errors as print_errors
-from .notes import complain as complain, note as note, warn as warn
+from .notes import complain as complain, note as note, print_errors as print_errors, warn as warn
 from .outputs import (
     PARQUET as PARQUET,
     Needed as Needed,
@@ -43,17 +42,15 @@ from .outputs import (
 )
 from .progress_bars import duration as duration, progress as progress
 from .reading_options import (
+    KEYS as KEYS,
     add_pairs as add_pairs,
     add_readings as add_readings,
     add_readings_argument as add_readings_argument,
-    observed_readings as observed_readings,
-    refuse_wrong_order as refuse_wrong_order,
-    warn_of as warn_of,
-)
-from .table_options import (
-    KEYS as KEYS,
     add_tables as add_tables,
     named_sources as named_sources,
+    observed_readings as observed_readings,
+    refuse_wrong_order as refuse_wrong_order,
     rule as rule,
+    warn_of as warn_of,
     with_options as with_options,
 )

@@ -95,8 +95,7 @@ def run(options: Namespace) -> int:
     """Check all designs; return 1 unless all are as expected, 3 if a file cannot be used."""
     from ballplate.results.checked_files import Wanted, check_files
 
-    from .common import print_json
-    from .file_patterns import matching_files
+    from .common import matching_files, print_json
     from .progress_bars import progress
 
     goals = _goals(options)
@@ -153,7 +152,7 @@ def _goals(options: Namespace) -> tuple[Any, ...]:
 
 def _print(checked: CheckedFile, options: Namespace) -> None:
     from .common import print_lines
-    from .excerpts import print_errors
+    from .notes import print_errors
 
     tell_notes(checked.notes)
     warn(checked.doubts)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import glob
 import json
 import math
 import shutil
@@ -10,6 +11,7 @@ import textwrap
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from collections.abc import Callable, Sequence
 from functools import wraps
+from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -126,7 +128,7 @@ def number(text: str, unit: str = "") -> float:
 @argument_type
 def day(text: str) -> str:
     """Argument type: a day such as 2026-11-22."""
-    from ballplate.simulator.inputs.days import stated_day
+    from ballplate.simulator.inputs.quantity_types import stated_day
 
     return stated_day(text)
 
@@ -311,3 +313,35 @@ def print_json(results: list[dict[str, Any]]) -> None:
         ensure_ascii=False,
     )
     print()
+
+
+# Folders whose YAML files are no experiments.
+OTHERS = ("sweeps", "machines")
+
+
+def matching_files(patterns: Sequence[Path]) -> list[Path]:
+    """Return files of names and patterns, each once; patterns omit folders of sweeps and machines.
+
+    A pattern without a match is kept and reported as a missing file.
+    """
+    paths: dict[Path, None] = {}
+    for path in patterns:
+        matches = (
+            [Path(name) for name in sorted(glob.glob(str(path), recursive=True))]
+            if is_pattern(path)
+            else []
+        )
+        # Folders that the pattern names itself are meant.
+        named = sum(1 for _ in takewhile(lambda part: not glob.has_magic(part), path.parts))
+        chosen = [
+            match
+            for match in matches
+            if match.is_file() and not set(match.parts[named:-1]) & set(OTHERS)
+        ]
+        paths |= dict.fromkeys(chosen or [path])
+    return list(paths)
+
+
+def is_pattern(path: Path) -> bool:
+    """True if a path is a pattern, and not the name of a file."""
+    return glob.has_magic(str(path)) and not path.exists()

@@ -11,14 +11,13 @@ from collections.abc import Sequence
 
 from ballplate.simulator.computing.signals import ANSWERS
 from ballplate.simulator.inputs.extensions import fault_of, registered
-from ballplate.simulator.inputs.unusable import UnusableError
+from ballplate.simulator.inputs.messages import UnusableError
 
 from .commands import tell_of_extensions
-from .interruption import Interruption
 from .notes import told
 from .outputs import UsageError, check_outputs
 from .parsers import grammar, parser, with_command
-from .streams import StandardOutputError, lasting_streams
+from .streams import Interruption, StandardOutputError, lasting_streams
 
 USAGE, BAD_FILE, INTERNAL = 2, 3, 70
 
@@ -94,7 +93,7 @@ def _run(options: argparse.Namespace) -> int:
         print(in_one_line(f"ballplate {options.command}: {error}"), file=sys.stderr)
         return USAGE
     except ExperimentError as error:
-        from .excerpts import print_errors
+        from .notes import print_errors
 
         print_errors(error.messages, options)
         return BAD_FILE

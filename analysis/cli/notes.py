@@ -1,4 +1,4 @@
-"""Options of all commands for the amount of notes on standard error."""
+"""Notes, warnings and errors on standard error, and the options for more or fewer."""
 
 from __future__ import annotations
 
@@ -6,11 +6,13 @@ import sys
 import time
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from ballplate.rank import Verdict
+    from ballplate.simulator.inputs.messages import Message
 
 
 def add_telling(parser: ArgumentParser) -> None:
@@ -89,3 +91,20 @@ def told(options: Namespace) -> Iterator[None]:
             f"{options.command}: {elapsed:.3g} s, {processor:.3g} s of the processor in this"
             " process",
         )
+
+
+def print_errors(messages: Iterable[Message], options: Namespace) -> None:
+    """Print errors on standard error, a line each; at a terminal, and with --verbose, with the
+    lines of the files.
+    """
+    from ballplate.simulator.inputs.messages import folded, in_one_line
+
+    with_lines = options.verbose or sys.stderr.isatty()
+    for message in folded(messages):
+        print(message, file=sys.stderr)
+        if with_lines and message.line:
+            with suppress(OSError, ValueError, IndexError):
+                lines = Path(message.file).read_text(encoding="utf-8-sig").splitlines()
+                line = lines[message.line - 1].replace("\t", " ")
+                mark = " " * len(in_one_line(line[: message.column - 1]))
+                print(f"    {in_one_line(line)}\n    {mark}^", file=sys.stderr)

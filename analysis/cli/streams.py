@@ -1,14 +1,20 @@
-"""Standard streams that are closed, full, without a reader, or of another encoding than UTF-8."""
+"""Standard streams that fail, and signals that ask a command to end."""
 
 from __future__ import annotations
 
 import errno
 import io
 import os
+import signal
 import sys
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from types import FrameType
 from typing import Any
+
+from ballplate.simulator.computing.signals import ANSWERS
 
 
 class StandardOutputError(Exception):
@@ -64,3 +70,44 @@ def lasting_streams() -> Iterator[None]:
         sys.stdout, written = before, sys.stdout
         with suppress(StandardOutputError):
             written.flush()
+
+
+# Seconds within which signals count as one.
+SAME_SIGNAL = 0.5
+
+
+@dataclass
+class Interruption:
+    """The signal that came, and a function that returns what is kept if the command ends now."""
+
+    came: str = ""
+    at: float = 0.0
+    kept: Callable[[], str] = str
+
+    def handle(self, number: int, _: FrameType | None) -> None:
+        """Raise KeyboardInterrupt at the first signal, and end the process at a later one."""
+        if not self.came:
+            self.came, self.at = signal.Signals(number).name, time.monotonic()
+            raise KeyboardInterrupt
+        # Programs in between, such as `timeout`, send what the terminal sends too.
+        if time.monotonic() > self.at + SAME_SIGNAL:
+            self.tell()
+            os._exit(self.status)
+
+    def answer(self) -> None:
+        """Raise KeyboardInterrupt after a signal whose exception a library has caught."""
+        if self.came:
+            raise KeyboardInterrupt
+
+    def tell(self) -> None:
+        """Report on standard error that the command has ended, and what it keeps."""
+        kept = self.kept()
+        print(f"{self.word}; {kept}" if kept else self.word, file=sys.stderr, flush=True)
+
+    @property
+    def status(self) -> int:
+        return ANSWERS[self.came or "SIGINT"][0]
+
+    @property
+    def word(self) -> str:
+        return ANSWERS[self.came or "SIGINT"][1]

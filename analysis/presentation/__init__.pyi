@@ -19,7 +19,6 @@ from .formatting import (
     to_uncertainty as to_uncertainty,
     uncertainty_words as uncertainty_words,
 )
-from .paper import escaped as escaped, on_paper as on_paper
 from .pictures import draw_box as draw_box
 from .result import FitResult as FitResult, Result as Result
 from .scenes import (
@@ -41,7 +40,9 @@ from .svg import (
     blank_axes as blank_axes,
     common_legend as common_legend,
     drawing as drawing,
+    escaped as escaped,
     legend_above as legend_above,
+    on_paper as on_paper,
     placed_axes as placed_axes,
     round_number as round_number,
     save as save,

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ballplate.simulator.inputs.settings import number_of
 
 from .files import write_file
-from .formats import as_html, as_latex, as_markdown
-from .formatting import Data, as_data
+from .formatting import Data, as_data, as_html, as_latex, as_markdown
 from .table_columns import MainTable, table_rows
 
 if TYPE_CHECKING:

@@ -7,11 +7,14 @@ import math
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from ballplate.simulator.inputs.arguments import ensure_path
+from ballplate.simulator.inputs.messages import in_one_line
+from ballplate.simulator.machines.protocol import Array
 
 from .files import write_file
 
@@ -188,3 +191,16 @@ def save(figure: Figure, path: str | Path | None, words: str) -> Figure:
         figure.savefig(whole, format=kind[1:], facecolor="white", dpi=200, metadata=metadata)
     write_file(path, whole.getvalue())
     return figure
+
+
+def escaped(text: str) -> str:
+    """Return a text for HTML, in one line."""
+    return escape(in_one_line(text))
+
+
+def on_paper(points: Array, lower: Array, scale: float, margin: float, height: float) -> Array:
+    """Return points (n, 2) in a drawing of a `height`, whose second axis runs downwards, with the
+    corner `lower` (2,) at its margins.
+    """
+    moved = scale * (points - lower)
+    return np.column_stack([margin + moved[:, 0], height - margin - moved[:, 1]])

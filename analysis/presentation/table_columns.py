@@ -16,7 +16,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import repeat
 from typing import Any
 
-from ballplate.simulator.inputs.spreadsheets import CsvWriter
+from ballplate.simulator.inputs.decoding import CsvWriter
 from ballplate.simulator.machines.protocol import Array
 
 from .formatting import Data, aligned, amount_of, ascii_units, number, to_uncertainty, unit_of

@@ -17,9 +17,8 @@ from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.inputs.quantities import Target
 from ballplate.simulator.machines.protocol import Array
 
-from .canonical import elementary_mixture, principal_directions
 from .descriptions import described, largest_displacement, signed
-from .directions import Direction
+from .directions import Direction, elementary_mixture, principal_directions
 
 # Limit of the gap: a greater one separates determined directions from rounding.
 GREAT = 1e9

@@ -6,21 +6,18 @@ from .adjustments import (
     few_degrees_of_freedom as few_degrees_of_freedom,
     freedom_words as freedom_words,
 )
-from .checked_designs import (
-    PlannedUncertainty as PlannedUncertainty,
-    check as check,
-    planned_uncertainty as planned_uncertainty,
-    predict as predict,
-)
 from .checked_files import (
     CheckedDesign as CheckedDesign,
     CheckedFile as CheckedFile,
+    PlannedUncertainty as PlannedUncertainty,
     Wanted as Wanted,
     advised as advised,
+    check as check,
     check_files as check_files,
     checked_design as checked_design,
+    planned_uncertainty as planned_uncertainty,
+    predict as predict,
 )
-from .diagnosis import has_exact_values as has_exact_values
 from .error_functions import estimated_curves as estimated_curves
 from .estimates import (
     ESTIMATE_COLUMNS as ESTIMATE_COLUMNS,
@@ -28,8 +25,15 @@ from .estimates import (
     labels as labels,
 )
 from .estimator_choice import COMPARED as COMPARED, EstimatorName as EstimatorName
+from .extension_results import has_exact_values as has_exact_values
 from .fits import Fit as Fit
 from .fitting import fit as fit
+from .lack_of_fit import (
+    LackOfFit as LackOfFit,
+    verdict_content as verdict_content,
+    verdict_data as verdict_data,
+    verdict_line as verdict_line,
+)
 from .plates import axes_of_plates as axes_of_plates
 from .prediction import Prediction as Prediction
 from .qualifications import (

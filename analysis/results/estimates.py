@@ -20,7 +20,7 @@ from ballplate.simulator.geometry.motions import (
 from ballplate.simulator.inputs.arguments import ensure_type
 from ballplate.simulator.inputs.settings import hint, number_of
 from ballplate.simulator.machines.protocol import Array, Integers, Unit
-from ballplate.uncertainty.kernel_quantities import task_distances
+from ballplate.uncertainty.quantities import task_distances
 
 ParameterKind = Literal["machine", "origin", "rotation", "offset", "length", "influence", "ball"]
 FunctionKind = Literal[ParameterKind, "task"]

@@ -17,19 +17,17 @@ from ballplate.presentation.vectors import Vectors, draw_vectors
 from ballplate.rank.verdicts import Verdict
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.gauss_newton import Solution
+from ballplate.simulator.experiment.earlier_campaigns import LEAST_SIGMA
 from ballplate.simulator.inputs.arguments import ensure_positive, ensure_type
 from ballplate.simulator.inputs.extensions import function, service
 from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.maps.fit_verdict import LackOfFit
-from ballplate.simulator.maps.map_prior import LEAST_SIGMA
 from ballplate.simulator.readings.given_points import ensure_points, probe_places
 from ballplate.simulator.readings.observed_readings import ObservedReadings
+from ballplate.uncertainty.pairs import TaskUncertainty
 from ballplate.uncertainty.summaries import Quantity, tasks_of
-from ballplate.uncertainty.tasks import TaskUncertainty
 
 from .adjustments import Adjustment, few_degrees_of_freedom, freedom_words
-from .diagnosis import Suspicion, has_exact_values, lack_of_fit
 from .error_functions import EstimatedCurve, estimated_curves
 from .estimates import (
     ESTIMATE_COLUMNS,
@@ -42,7 +40,11 @@ from .estimates import (
 from .extension_results import (
     IssuedCertificate,
     SeparateSigmas,
+    Suspicion,
+    has_exact_values,
+    lack_of_fit,
 )
+from .lack_of_fit import LackOfFit
 from .plates import PlateCoordinates
 from .prediction import by_label, length_headline, rank_words
 from .residuals import Residual, reading_residuals, residual_groups

@@ -19,10 +19,9 @@ from ballplate.simulator.readings.observed_readings import ObservedReadings
 from ballplate.uncertainty.summaries import uncertainties
 
 from .adjustments import Adjustment, adjusted
-from .checked_designs import check
-from .diagnosis import diagnosed
+from .checked_files import check
 from .estimates import estimated_functions, parameter_estimates
-from .extension_results import SeparateSigmas
+from .extension_results import SeparateSigmas, diagnosed
 from .fits import Fit
 from .plates import plate_coordinates
 from .residuals import largest_residuals

@@ -18,9 +18,9 @@ from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.inputs.extensions import optional_service, service
 from ballplate.simulator.inputs.settings import hint, number_of
+from ballplate.uncertainty.pairs import TaskUncertainty
 from ballplate.uncertainty.scale import Scale, scale_of
 from ballplate.uncertainty.summaries import Quantity, tasks_of
-from ballplate.uncertainty.tasks import TaskUncertainty
 
 from .extension_results import PredictedAssumptions
 from .influences import InfluenceUncertainty, influence_data, influence_table

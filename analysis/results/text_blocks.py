@@ -22,9 +22,9 @@ from ballplate.rank.verdicts import GREAT, Verdict
 from ballplate.simulator.computing.numerics import printable
 from ballplate.simulator.inputs.settings import listing, number_of
 from ballplate.simulator.machines.protocol import Array
+from ballplate.uncertainty.pairs import TaskUncertainty, is_determined
 from ballplate.uncertainty.scale import Scale
 from ballplate.uncertainty.summaries import Quantity
-from ballplate.uncertainty.tasks import TaskUncertainty, is_determined
 
 from .adjustments import ARCSECOND, Adjustment
 from .plates import PlateCoordinates

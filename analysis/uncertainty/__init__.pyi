@@ -1,6 +1,6 @@
 # Public names of this package, each loaded from its module when it is first used.
-from .kernel_quantities import evaluation_points as evaluation_points
 from .pairs import (
+    expansion as expansion,
     open_above as open_above,
     pair_tiles as pair_tiles,
     pairs_of as pairs_of,
@@ -11,6 +11,7 @@ from .quantities import (
     QUANTITIES as QUANTITIES,
     RECORDED as RECORDED,
     RECORDED_IF_TOLD as RECORDED_IF_TOLD,
+    evaluation_points as evaluation_points,
     functions_of as functions_of,
 )
 from .scale import (
@@ -24,4 +25,3 @@ from .scale import (
     with_offsets as with_offsets,
 )
 from .summaries import Quantity as Quantity, summarise as summarise, uncertainties as uncertainties
-from .tasks import expansion as expansion

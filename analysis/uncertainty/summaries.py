@@ -26,10 +26,8 @@ from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.inputs.quantities import Target
 from ballplate.simulator.machines.protocol import Array
 
-from .kernel_quantities import evaluation_points
-from .pairs import PairSummary, PairTile, all_pairs, pairs_of
-from .quantities import DESCRIPTIONS, QUANTITIES, functions_of
-from .tasks import TaskUncertainty, task_uncertainties
+from .pairs import PairSummary, PairTile, TaskUncertainty, all_pairs, pairs_of, task_uncertainties
+from .quantities import DESCRIPTIONS, QUANTITIES, evaluation_points, functions_of
 
 
 @dataclass(frozen=True)

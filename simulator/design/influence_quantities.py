@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Annotated, ClassVar, get_args
 
 import numpy as np
 from ballplate.simulator.inputs.messages import Steps
-from ballplate.simulator.inputs.open_kinds import OpenKinds
 from ballplate.simulator.inputs.settings import Settings, listing
 from ballplate.simulator.inputs.units import Units
+from ballplate.simulator.inputs.validation import OpenKinds
 from ballplate.simulator.machines.protocol import Array, Integers, Unit
 
 from .lookup import References

@@ -12,9 +12,9 @@ import numpy as np
 from ballplate.simulator.geometry.ball_layouts import ArtefactSettings, BallLayout, corners, frozen
 from ballplate.simulator.inputs.messages import Step, Steps
 from ballplate.simulator.inputs.number_arrays import Array
+from ballplate.simulator.inputs.own_code import UNKNOWN, Trust
 from ballplate.simulator.inputs.problems import Problems, written_text
 from ballplate.simulator.inputs.settings import hint, listing, shorten
-from ballplate.simulator.inputs.trust import UNKNOWN, Trust
 from ballplate.simulator.inputs.yamltree import Sequence as SequenceNode, written
 from numpy.typing import NDArray
 

@@ -4,6 +4,7 @@ from .bounds import (
     OUTSIDE as OUTSIDE,
     TOLERANCE as TOLERANCE,
     Bounds as Bounds,
+    check_inside as check_inside,
     edge_of as edge_of,
     entered as entered,
     limits_of as limits_of,
@@ -12,10 +13,16 @@ from .bounds import (
 )
 from .calibrations import resolve_calibration as resolve_calibration
 from .changes import node_of as node_of
-from .inside_checks import check_inside as check_inside
+from .earlier_campaigns import (
+    LEAST_SIGMA as LEAST_SIGMA,
+    EarlierCampaign as EarlierCampaign,
+    MapData as MapData,
+    MapShare as MapShare,
+)
 from .json_schema import DRAFT as DRAFT, schema as schema, tidied as tidied
 from .layout import lay_out as lay_out
 from .loading import build as build, load as load, trees_of as trees_of, with_pool as with_pool
+from .machine import check_ends as check_ends
 from .model import (
     AtMost as AtMost,
     Candidate as Candidate,
@@ -27,8 +34,6 @@ from .model import (
     Probe as Probe,
     ReadingGroup as ReadingGroup,
 )
-from .modules import python_models as python_models, runs_code as runs_code
-from .name_rules import PLACE as PLACE, check_rule as check_rule
 from .named_files import (
     existing_file as existing_file,
     files_of_machine as files_of_machine,
@@ -37,6 +42,8 @@ from .named_files import (
     model_modules as model_modules,
     module_files as module_files,
     named_in as named_in,
+    python_models as python_models,
+    runs_code as runs_code,
 )
 from .own_sections import check_installed as check_installed
 from .placements import check_turns as check_turns, resolve_position as resolve_position
@@ -55,10 +62,12 @@ from .pool_sections import (
 )
 from .position_sections import Edges as Edges
 from .readings_section import (
+    PLACE as PLACE,
     ColumnsSettings as ColumnsSettings,
     CompensationSettings as CompensationSettings,
     Coordinate as Coordinate,
     ReadingsSettings as ReadingsSettings,
+    check_rule as check_rule,
 )
 from .sections import (
     Line as Line,
@@ -76,4 +85,3 @@ from .variants import (
     place_of as place_of,
     variant_trees as variant_trees,
 )
-from .volumes import check_ends as check_ends

@@ -13,8 +13,12 @@ from ballplate.simulator.machines.settings import (
     build_error_model,
     kind_of,
 )
-from ballplate.simulator.machines.true_machine_settings import FurtherTrueMachine, RandomSettings
-from ballplate.simulator.machines.truth import TruthError, true_machine
+from ballplate.simulator.machines.truth import (
+    FurtherTrueMachine,
+    RandomSettings,
+    TruthError,
+    true_machine,
+)
 
 from .structure import Sections
 

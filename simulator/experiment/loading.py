@@ -13,8 +13,8 @@ import numpy as np
 from ballplate.simulator.inputs.decoding import refuse_long_lines
 from ballplate.simulator.inputs.extensions import service
 from ballplate.simulator.inputs.messages import ExperimentError, Message
+from ballplate.simulator.inputs.own_code import OPENED, Trust
 from ballplate.simulator.inputs.problems import Problems, in_order, written_count
-from ballplate.simulator.inputs.trust import OPENED, Trust
 from ballplate.simulator.inputs.yamltree import (
     Mapping,
     Mark,
@@ -25,19 +25,17 @@ from ballplate.simulator.inputs.yamltree import (
     written,
 )
 from ballplate.simulator.machines.settings import with_defaults
-from ballplate.simulator.machines.true_machine_settings import with_model_defaults
+from ballplate.simulator.machines.truth import with_model_defaults
 
-from .bounds import resolve_bounds
+from .bounds import check_inside, resolve_bounds
 from .calibrations import resolve_calibration
 from .changes import node_of
 from .checks import check_calibration_read, check_names, check_radii, check_use
 from .error_model_checks import check_true_machine, with_usable_error_model
 from .influences import resolve_influences
-from .inside_checks import check_inside
 from .machine import resolve_evaluation, resolve_machine, resolve_noise, target_of
 from .model import Evaluation, Experiment, Position
-from .needed_services import needed_service
-from .own_sections import needed_extensions, resolve_own_sections
+from .own_sections import needed_extensions, needed_service, resolve_own_sections
 from .placements import resolve_position
 from .pool import enabled_only, placed_only
 from .priors import resolve_priors

@@ -16,15 +16,24 @@ from ballplate.simulator.inputs.messages import ExperimentError, Steps
 from ballplate.simulator.inputs.number_arrays import Array
 from ballplate.simulator.inputs.problems import Problems
 from ballplate.simulator.inputs.quantities import LengthFunction, Target
-from ballplate.simulator.inputs.quantity_words import format_length, typed_length
 from ballplate.simulator.inputs.settings import hint
 from ballplate.simulator.inputs.tables import read_table
+from ballplate.simulator.inputs.units import format_length, typed_length
 
-from .inside_checks import TOLERANCE, check_points
+from .bounds import TOLERANCE, check_points
 from .model import Evaluation, Probe, Task
 from .sections import MOST_POINTS, MachineSettings, PointsSettings, TaskSettings
 from .structure import Sections
-from .volumes import check_ends
+
+
+def check_ends(ends: Mapping[str, tuple[float, float]], steps: Steps, problems: Problems) -> bool:
+    """True if each axis of a volume ends above its beginning; others are reported."""
+    wrong = {axis: (low, high) for axis, (low, high) in ends.items() if high <= low}
+    for axis, (low, high) in wrong.items():
+        text = f"ends at {format_length(high)}, not above its beginning, {format_length(low)}"
+        problems.add((*steps, axis), f"{text}; exchange or correct them")
+    return not wrong
+
 
 AXES = ("x", "y", "z")
 

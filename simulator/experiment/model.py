@@ -20,12 +20,12 @@ from ballplate.simulator.geometry.ball_layouts import ArtefactSettings, BallLayo
 from ballplate.simulator.geometry.positions import Pose
 from ballplate.simulator.inputs.messages import ExperimentError, Message, Steps, format_path
 from ballplate.simulator.inputs.number_arrays import Array
+from ballplate.simulator.inputs.own_code import UNKNOWN, Trust
 from ballplate.simulator.inputs.quantities import Target
-from ballplate.simulator.inputs.trust import UNKNOWN, Trust
 from ballplate.simulator.inputs.yamltree import Mark, Node, mark_of, to_python, written
-from ballplate.simulator.maps.map_prior import EarlierCampaign, MapData, MapShare
 
 from .changes import changed_tree
+from .earlier_campaigns import EarlierCampaign, MapData, MapShare
 from .readings_section import ReadingsSettings, no_settings
 
 if TYPE_CHECKING:

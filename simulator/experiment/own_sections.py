@@ -6,12 +6,15 @@ from typing import Any
 
 from ballplate.simulator.design.lookup import References
 from ballplate.simulator.inputs.extensions import (
+    MissingExtensionError,
     is_installed,
     module_with,
     owner,
     registered,
+    service,
     shipped,
 )
+from ballplate.simulator.inputs.messages import Steps
 from ballplate.simulator.inputs.problems import Problems
 
 from .structure import KEYS, Sections
@@ -50,3 +53,12 @@ def needed_extensions(sections: Sections) -> tuple[str, ...]:
 
 def _parts(value: Any) -> tuple[Any, ...]:
     return value if isinstance(value, tuple) else (value,)
+
+
+def needed_service(name: str, steps: Steps, problems: Problems) -> Any | None:
+    """Return a service that what is written at `steps` needs, or report its absence."""
+    try:
+        return service(name)
+    except MissingExtensionError as error:
+        problems.add(steps, str(error))
+        return None

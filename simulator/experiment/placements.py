@@ -17,7 +17,7 @@ from ballplate.simulator.geometry.positions import (
     nominal_pose,
 )
 from ballplate.simulator.inputs.messages import Steps
-from ballplate.simulator.inputs.room_parts import Place, RoomPart, length_of
+from ballplate.simulator.inputs.quantity_types import Place, RoomPart, length_of
 
 from .bounds import Bounds, edge_of, limits_of, shared
 from .model import Position, ReadingGroup

@@ -9,10 +9,9 @@ from ballplate.simulator.design.observations.coordinates import CalibratedBalls
 from ballplate.simulator.design.observations.kinds import CALIBRATIONS
 from ballplate.simulator.geometry.ball_layouts import Name
 from ballplate.simulator.geometry.positions import Axis
-from ballplate.simulator.inputs.open_kinds import OpenKinds
-from ballplate.simulator.inputs.quantity_types import Duration, Length
-from ballplate.simulator.inputs.room_parts import Place, RoomPart
+from ballplate.simulator.inputs.quantity_types import Duration, Length, Place, RoomPart
 from ballplate.simulator.inputs.settings import Forms, NonEmpty, Settings, Several, Text
+from ballplate.simulator.inputs.validation import OpenKinds
 from pydantic import Discriminator, Field, Tag, create_model, model_validator
 
 from .position_sections import Count, LengthPerAxis, PositionSettings, ProbeNames, QuarterTurns

@@ -18,7 +18,7 @@ from ballplate.simulator.machines.protocol import CustomModelError, ErrorModel, 
 from ballplate.simulator.machines.settings import build_error_model, kind_of
 
 from .model import Position, Prior, Probe
-from .needed_services import needed_service
+from .own_sections import needed_service
 from .sections import MapPriorSettings, PriorSettings
 from .structure import Sections
 

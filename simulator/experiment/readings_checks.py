@@ -10,9 +10,8 @@ from ballplate.simulator.inputs.quantities import QuantityError, parse_positive_
 from ballplate.simulator.inputs.settings import hint
 from ballplate.simulator.inputs.units import LENGTH_UNITS, plain_unit
 
-from .name_rules import check_rule
-from .needed_services import needed_service
-from .readings_section import ColumnsSettings, CompensationSettings, ReadingsSettings
+from .own_sections import needed_service
+from .readings_section import ColumnsSettings, CompensationSettings, ReadingsSettings, check_rule
 from .structure import Sections
 
 AXES = ("x", "y", "z")

@@ -15,11 +15,11 @@ from ballplate.simulator.geometry.ball_layouts import (
     coincident_balls,
 )
 from ballplate.simulator.inputs.messages import ExperimentError, Steps
+from ballplate.simulator.inputs.own_code import Trust
 from ballplate.simulator.inputs.problems import Problems, written_keys
-from ballplate.simulator.inputs.quantity_words import format_length
 from ballplate.simulator.inputs.settings import hint, shorten
 from ballplate.simulator.inputs.tables import read_table
-from ballplate.simulator.inputs.trust import Trust
+from ballplate.simulator.inputs.units import format_length
 from ballplate.simulator.inputs.yamltree import Mapping, Node, Sequence as SequenceNode, written
 
 from .structure import Sections

@@ -11,16 +11,21 @@ from ballplate.simulator.design.noise import Distribution, NoiseSettings
 from ballplate.simulator.design.observations.kinds import CalibrationSettings
 from ballplate.simulator.geometry.artefacts import ARTEFACTS, AnyArtefactSettings
 from ballplate.simulator.geometry.ball_layouts import Coordinates, Name
-from ballplate.simulator.inputs.days import Day
-from ballplate.simulator.inputs.quantity_types import Length, PositiveLength, TargetFunction
+from ballplate.simulator.inputs.quantity_types import Day, Length, PositiveLength, TargetFunction
 from ballplate.simulator.inputs.settings import Forms, NonEmpty, Settings, Several, Text
 from ballplate.simulator.machines.settings import ErrorModelSettings
-from ballplate.simulator.machines.true_machine_settings import TrueMachineSettings, ZeroSettings
+from ballplate.simulator.machines.truth import TrueMachineSettings, ZeroSettings
 from pydantic import Discriminator, Field, StringConstraints, Tag, model_validator
 
 from .pool_sections import PoolSettings
-from .position_sections import Edges, LengthPerAxis, PositionSettings
-from .probe_sections import AnyProbe, HeadSettings, StarSettings
+from .position_sections import (
+    AnyProbe,
+    Edges,
+    HeadSettings,
+    LengthPerAxis,
+    PositionSettings,
+    StarSettings,
+)
 from .readings_section import ReadingsSettings
 
 # Without control characters, which would reach the terminal.

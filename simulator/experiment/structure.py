@@ -11,18 +11,16 @@ from ballplate.simulator.design.influence_quantities import AnyInfluence
 from ballplate.simulator.design.observations.kinds import CalibrationSettings
 from ballplate.simulator.geometry.artefacts import AnyArtefactSettings
 from ballplate.simulator.inputs.extensions import MissingExtensionError, names, provided
-from ballplate.simulator.inputs.messages import Steps
+from ballplate.simulator.inputs.messages import Steps, UnusableError
 from ballplate.simulator.inputs.problems import Problems
 from ballplate.simulator.inputs.settings import Settings, describe, hint, nearest
-from ballplate.simulator.inputs.unusable import UnusableError
 from ballplate.simulator.inputs.validation import explain_in, type_adapter
 from ballplate.simulator.inputs.wording import LACKING
 from ballplate.simulator.inputs.yamltree import Mapping, Node, Scalar, Sequence, to_python
 from pydantic import TypeAdapter, ValidationError
 
 from .pool_sections import GroupSettings, ListedSettings, PoolSettings, PricedSettings, is_group
-from .position_sections import PositionSettings
-from .probe_sections import AnyProbe, StarSettings
+from .position_sections import AnyProbe, PositionSettings, StarSettings
 from .sections import AnyPrior, ExperimentSettings
 
 # Sections whose entries are validated one by one: form of the section and type of an entry.

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Literal, Self, Union
 
-from ballplate.simulator.inputs.open_kinds import OpenKinds
 from ballplate.simulator.inputs.quantity_types import PositiveLength
+from ballplate.simulator.inputs.validation import OpenKinds
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from .axes import DIRECTIONS, DirectionsSettings, directions

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 from ballplate.simulator.inputs.number_arrays import Array
-from ballplate.simulator.inputs.room_parts import Place, RoomPart
+from ballplate.simulator.inputs.quantity_types import Place, RoomPart
 
 from .ball_layouts import BallLayout
 from .motions import rotation_matrix

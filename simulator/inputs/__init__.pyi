@@ -13,12 +13,14 @@ from .covariances import (
     half_digit as half_digit,
     matrix_problems as matrix_problems,
 )
-from .days import Day as Day, parse_day as parse_day, stated_day as stated_day
 from .decoding import (
     LINE_END as LINE_END,
+    CsvWriter as CsvWriter,
+    cell_of_text as cell_of_text,
     decoded as decoded,
     refuse_controls as refuse_controls,
     text_and_encoding as text_and_encoding,
+    text_of_cell as text_of_cell,
 )
 from .extensions import (
     MissingExtensionError as MissingExtensionError,
@@ -34,18 +36,22 @@ from .messages import (
     Message as Message,
     Step as Step,
     Steps as Steps,
+    UnusableError as UnusableError,
     format_path as format_path,
     in_lines as in_lines,
     in_one_line as in_one_line,
     refused as refused,
 )
-from .module_finder import own_modules as own_modules
 from .number_arrays import Array as Array, Flags as Flags, Integers as Integers
 from .own_code import (
+    OPENED as OPENED,
+    UNKNOWN as UNKNOWN,
     OwnCodeError as OwnCodeError,
+    Trust as Trust,
     error_text as error_text,
     own_array as own_array,
     own_frame as own_frame,
+    own_modules as own_modules,
     own_result as own_result,
     running_own_code as running_own_code,
 )
@@ -78,30 +84,24 @@ from .quantity_types import (
     Angle as Angle,
     Bending as Bending,
     CommonPart as CommonPart,
+    Day as Day,
     Duration as Duration,
     Expansion as Expansion,
     Length as Length,
     LengthDrift as LengthDrift,
+    Place as Place,
     PositiveAngle as PositiveAngle,
     PositiveLength as PositiveLength,
     PositiveTemperatureDifference as PositiveTemperatureDifference,
     Ratio as Ratio,
     RatioDrift as RatioDrift,
+    RoomPart as RoomPart,
     Temperature as Temperature,
     TemperatureDifference as TemperatureDifference,
-)
-from .quantity_words import (
-    format_angle as format_angle,
-    format_duration as format_duration,
-    format_length as format_length,
-    length_text as length_text,
-    typed_length as typed_length,
-)
-from .room_parts import (
-    Place as Place,
-    RoomPart as RoomPart,
     length_of as length_of,
+    parse_day as parse_day,
     place_text as place_text,
+    stated_day as stated_day,
 )
 from .settings import (
     Forms as Forms,
@@ -116,11 +116,6 @@ from .settings import (
     number_of as number_of,
     shorten as shorten,
 )
-from .spreadsheets import (
-    CsvWriter as CsvWriter,
-    cell_of_text as cell_of_text,
-    text_of_cell as text_of_cell,
-)
 from .tables import (
     MOST_COLUMNS as MOST_COLUMNS,
     MOST_ROWS as MOST_ROWS,
@@ -131,16 +126,19 @@ from .tables import (
     read_table as read_table,
     table_lines as table_lines,
 )
-from .trust import OPENED as OPENED, UNKNOWN as UNKNOWN, Trust as Trust
 from .units import (
     ANGLE_UNITS as ANGLE_UNITS,
     DURATION_UNITS as DURATION_UNITS,
     KINDS as KINDS,
     LENGTH_UNITS as LENGTH_UNITS,
     Units as Units,
+    format_angle as format_angle,
+    format_duration as format_duration,
+    format_length as format_length,
+    length_text as length_text,
     plain_unit as plain_unit,
+    typed_length as typed_length,
 )
-from .unusable import UnusableError as UnusableError
 from .validation import validated as validated
 from .yaml_writing import yaml_text as yaml_text
 from .yamltree import (

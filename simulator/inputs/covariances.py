@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
+from .decoding import text_of_cell
 from .messages import MOST_MESSAGES, ExperimentError, Message, refused
 from .number_arrays import Array
 from .settings import hint, shorten
-from .spreadsheets import text_of_cell
 from .tables import decimal_sign, pointed, table_lines, wrong_count, wrong_number
 from .units import LENGTH_UNITS, plain_unit
 from .yamltree import Mark

@@ -21,7 +21,7 @@ from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import TYPE_CHECKING, Any
 
-from .unusable import UnusableError
+from .messages import UnusableError
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint

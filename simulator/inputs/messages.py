@@ -126,3 +126,7 @@ def format_path(steps: Iterable[Step]) -> str:
         else:
             path += f"[{step}]"
     return path
+
+
+class UnusableError(Exception):
+    """An object cannot be used; the text has fact, reason and remedy."""

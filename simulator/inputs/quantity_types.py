@@ -5,23 +5,34 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from datetime import date
+from fractions import Fraction
 from functools import partial
-from typing import Annotated, Any
+from typing import Annotated, Any, get_args
 
-from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic import (
+    AfterValidator,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    PlainValidator,
+    WithJsonSchema,
+)
 from pydantic_core import CoreSchema, core_schema
 
 from .quantities import (
     LENGTH_FUNCTION_EXAMPLE,
     NUMBER,
     LengthFunction,
+    QuantityError,
     parse_common_part,
     parse_duration,
+    parse_length,
     parse_length_function,
     parse_quantity,
     parse_temperature,
 )
-from .units import KINDS
+from .settings import hint, shorten
+from .units import KINDS, typed_length
 
 
 @dataclass(frozen=True)
@@ -99,3 +110,102 @@ Duration = Annotated[
 ]
 LengthDrift = Annotated[float, _of("length per time", "0.5 um/h", "-2 nm/min")]
 RatioDrift = Annotated[float, _of("ratio per time", "0.3 ppm/h")]
+
+
+ENDS = {"low": 0.0, "middle": 0.5, "high": 1.0}
+PART = r" *([+-]?[0-9]{1,9}(\.[0-9]{1,20})? *%|[0-9]{1,9} */ *[1-9][0-9]{0,8}) *"
+
+
+@dataclass(frozen=True)
+class RoomPart:
+    """A part of the free room along an axis as ``written``: from its low end, 0, to its high end,
+    1.
+    """
+
+    fraction: float
+    written: str
+
+
+def length_of(place: Place, low: float, high: float) -> float:
+    """Return a place in metres; parts of a room between two ends, the middle if there is no room.
+
+    >>> length_of(0.75, 0.0, 0.5), length_of(RoomPart(0.3, "30 %"), -0.05, 0.95)
+    (0.75, 0.25)
+    """
+    if isinstance(place, float):
+        return place
+    fraction = place.fraction if low <= high else 0.5
+    # A millionth of a micrometre: as round as a length that one would write.
+    return float(round(low + fraction * (high - low), 12)) + 0.0
+
+
+def parse_place(value: object) -> float | RoomPart:
+    """Read a length and return it in metres, or a part of the free room.
+
+    :raises QuantityError: neither a length, nor low, middle, high, nor a part from 0 % to 100 %.
+
+    >>> parse_place("750 mm"), parse_place("2/9").written, parse_place("high").fraction
+    (0.75, '2/9', 1.0)
+    """
+    text = value.strip() if isinstance(value, str) else ""
+    if text in ENDS:
+        return RoomPart(ENDS[text], text)
+    if re.fullmatch(PART, text):
+        fraction = Fraction(re.sub("[ %]", "", text)) / (100 if "%" in text else 1)
+        if 0 <= fraction <= 1:
+            return RoomPart(float(fraction), text)
+        raise QuantityError(f'"{text}" is beyond the free room; give 0 % to 100 %')
+    if not text[:1].isalpha():
+        return parse_length(value)
+    raise QuantityError(
+        f'"{shorten(text)}" is not a place ({hint(text, ENDS)}); write low, middle, high, a part of'
+        ' the free room such as "30 %", or a length such as "750 mm"'
+    )
+
+
+def place_text(place: Place) -> str:
+    """Return a place as typed into a file.
+
+    >>> place_text(0.25), place_text(RoomPart(0.3, "30 %"))
+    ('250 mm', '30 %')
+    """
+    return place.written if isinstance(place, RoomPart) else typed_length(place)
+
+
+_SCHEMAS = [
+    {"enum": [*ENDS]},
+    {"type": "string", "pattern": f"^{PART}$", "examples": ["30 %"]},
+    get_args(Length)[-1].json_schema,
+]
+Place = Annotated[
+    float | RoomPart, PlainValidator(parse_place), WithJsonSchema({"anyOf": _SCHEMAS})
+]
+
+
+def parse_day(text: str) -> date:
+    """Return the day that a text such as 2026-11-22 names.
+
+    :raises ValueError: it is no day.
+
+    >>> parse_day("2026-11-22").year
+    2026
+    """
+    try:
+        if re.fullmatch(r"[0-9]{4}-[0-9]{2}-[0-9]{2}", text):
+            return date.fromisoformat(text)
+    except ValueError:
+        pass
+    raise ValueError(f'"{text[:20]}" is no day; write it as 2026-11-22')
+
+
+def stated_day(text: str) -> str:
+    """Return a text that names a day, unchanged.
+
+    :raises ValueError: it is no day.
+    """
+    parse_day(text)
+    return text
+
+
+Day = Annotated[str, AfterValidator(stated_day)]
+"""A day in a file."""

@@ -1,14 +1,20 @@
-"""Validation of a tree against settings."""
+"""Validation of a tree against settings, whose kinds extensions extend."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
 from functools import cache
-from typing import Any, TypeVar, cast
+from typing import Annotated, Any, ClassVar, TypeVar, cast, get_args
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, TypeAdapter, ValidationError
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from .messages import Steps
+from .extensions import MissingExtensionError, names, provided, provider
+from .messages import Steps, UnusableError
 from .problems import Problems
+from .settings import Settings
 from .wording import explain
 from .yamltree import Node, to_python
 
@@ -47,3 +53,82 @@ def type_adapter(kind: Any) -> TypeAdapter[Any]:
 @cache
 def _schema(adapter: TypeAdapter[Any]) -> dict[str, Any]:
     return adapter.json_schema()
+
+
+@dataclass(frozen=True)
+class OpenKinds:
+    """Annotation of a union, or of `base` where the kernel has no kinds: values of `kind` that it
+    lacks are looked up among names that extensions provide under `provided`.
+
+    `base` is the class of their settings; `form` returns the class that the union needs.
+    """
+
+    discriminator: ClassVar[str] = "kind"
+
+    provided: str
+    base: type[Settings] = Settings
+    form: Callable[[Any], Any] = lambda settings: settings
+
+    def settings(self, kind: str) -> Any | None:
+        """Return an extension's settings of a kind, or None.
+
+        :raises UnusableError: the extension lacks them.
+        """
+        settings = provided(self.provided, kind, "SETTINGS")
+        if settings is None:
+            return None
+        is_right = isinstance(settings, type) and issubclass(settings, self.base)
+        if not is_right or get_args(settings.model_fields["kind"].annotation) != (kind,):
+            extension = provider(self.provided, kind)
+            assert extension is not None
+            text = f"is no {self.base.__name__} with kind: Literal[{kind!r}]"
+            raise UnusableError(f"extension {extension.name}: SETTINGS of {kind} {text}")
+        return self.form(settings)
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        # The kernel's kinds, if any, are discriminated here, since a field would do so only
+        # afterwards.
+        if source is not self.base:
+            of_kernel = handler.generate_schema(Annotated[source, Field(discriminator="kind")])
+            return core_schema.no_info_wrap_validator_function(self._validated, of_kernel)
+        # An empty union has nothing to write.
+        return core_schema.no_info_wrap_validator_function(
+            self._validated,
+            core_schema.tagged_union_schema({}, self.discriminator),
+            serialization=core_schema.simple_ser_schema("any"),
+        )
+
+    def _validated(self, value: Any, of_kernel: Callable[[Any], Any]) -> Any:
+        try:
+            return of_kernel(value)
+        except ValidationError as refusal:
+            (first, *_) = refusal.errors(include_url=False, include_input=False)
+            if first["type"] != "union_tag_invalid" or first["loc"]:
+                raise
+        settings = self.settings(str(value["kind"]))
+        if settings is None:
+            raise PydanticCustomError("open_tag_invalid", "unknown kind")
+        return settings.model_validate(value)
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        union_schema = handler(schema)
+        additions: list[Any] = []
+        for kind in names(self.provided, with_registered=True):
+            with suppress(MissingExtensionError):
+                additions.append(self.settings(kind))
+        for settings in additions:
+            settings.model_rebuild()
+        if additions:
+            # As members of a union their own models are added to the definitions.
+            union = core_schema.union_schema(
+                [settings_class.__pydantic_core_schema__ for settings_class in additions]
+            )
+            extension_schema = handler(union)
+            union_schema.setdefault("oneOf", []).extend(
+                extension_schema.get("anyOf", [extension_schema])
+            )
+        return union_schema

@@ -60,4 +60,4 @@ from .settings import (
     build_error_model as build_error_model,
     kind_of as kind_of,
 )
-from .true_machine_settings import FurtherTrueMachine as FurtherTrueMachine
+from .truth import FurtherTrueMachine as FurtherTrueMachine

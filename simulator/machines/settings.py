@@ -10,8 +10,8 @@ from typing import Annotated, Any, Literal, Union, get_args
 
 from ballplate.simulator.inputs.extensions import provided
 from ballplate.simulator.inputs.messages import Steps
-from ballplate.simulator.inputs.open_kinds import OpenKinds
 from ballplate.simulator.inputs.settings import Settings, listing
+from ballplate.simulator.inputs.validation import OpenKinds
 from pydantic import Field
 
 from .empirical_settings import EMPIRICAL

@@ -1,5 +1,4 @@
 # Public names of this package, each loaded from its module when it is first used.
-from .fingerprints import fingerprint as fingerprint, position_fingerprints as position_fingerprints
 from .generate import (
     NoReadingError as NoReadingError,
     Simulated as Simulated,
@@ -23,7 +22,9 @@ from .reading_sources import (
     SourceRows as SourceRows,
     SourceText as SourceText,
     Units as Units,
+    fingerprint as fingerprint,
     is_plain as is_plain,
     named_rows as named_rows,
     plain_rows as plain_rows,
+    position_fingerprints as position_fingerprints,
 )

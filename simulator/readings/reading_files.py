@@ -12,6 +12,7 @@ import numpy as np
 from ballplate.simulator.design.arrays import Design, Readings, in_sequence, measured, nominal_state
 from ballplate.simulator.design.observations.readings import expected_readings
 from ballplate.simulator.experiment.readings_section import ReadingsSettings, no_settings
+from ballplate.simulator.inputs.decoding import CsvWriter
 from ballplate.simulator.inputs.extensions import optional_service, service
 from ballplate.simulator.inputs.messages import (
     MORE_ERRORS,
@@ -21,7 +22,6 @@ from ballplate.simulator.inputs.messages import (
     refused,
 )
 from ballplate.simulator.inputs.settings import hint, listing, number_of
-from ballplate.simulator.inputs.spreadsheets import CsvWriter
 from ballplate.simulator.inputs.tables import FileRow
 from ballplate.simulator.inputs.units import LENGTH_UNITS
 from ballplate.simulator.inputs.yamltree import GivenText, Mark

@@ -7,8 +7,7 @@ from itertools import product
 import ballplate as bp
 import numpy as np
 import pytest
-from ballplate.rank.curve_shapes import shape
-from ballplate.rank.deformations import deformation
+from ballplate.rank.descriptions import deformation, shape
 
 from tests.analysis import wording
 from tests.reference.small_quickstart import small_sections

@@ -15,8 +15,7 @@ from ballplate.extensions.planning.campaign_choice import Request, campaign
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.functions import Coordinates, Distances, Parameters
 from ballplate.simulator.experiment.loading import with_pool
-from ballplate.uncertainty.kernel_quantities import QuantityKind, evaluation_points
-from ballplate.uncertainty.quantities import QUANTITIES
+from ballplate.uncertainty.quantities import QUANTITIES, QuantityKind, evaluation_points
 
 from tests.reference.small_quickstart import OF_ENTRIES
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.results.checked_designs import predict
+from ballplate.results.checked_files import predict
 from ballplate.results.fits import Fit
 from ballplate.results.fitting import fit
 from ballplate.results.prediction import Prediction

@@ -17,7 +17,7 @@ from typing import Any
 
 import pytest
 from ballplate.cli import main
-from ballplate.cli.interruption import Interruption
+from ballplate.cli.streams import Interruption
 from ballplate.extensions.sweeps import execute
 from ballplate.simulator.computing import processes
 from ballplate.simulator.computing.processes import in_processes

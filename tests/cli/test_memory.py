@@ -75,7 +75,7 @@ def test_a_process_with_little_memory(tmp_path: Path) -> None:
     (tmp_path / "large.yaml").write_text(text, encoding="utf-8")
     code = (
         "import os, resource, sys, scipy.linalg, scipy.spatial;"
-        "import ballplate.cli.run, ballplate.results.checked_designs;"
+        "import ballplate.cli.run, ballplate.results.checked_files;"
         "taken = int(open('/proc/self/statm').read().split()[0]) * os.sysconf('SC_PAGE_SIZE');"
         "resource.setrlimit(resource.RLIMIT_AS, (taken + 200_000_000,) * 2);"
         "from ballplate.cli import main; sys.exit(main(sys.argv[1:]))"

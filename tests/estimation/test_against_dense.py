@@ -17,9 +17,8 @@ from ballplate.simulator.estimation.functions import Displacements, displacement
 from ballplate.simulator.estimation.gauss_newton import newton_step
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.geometry.motions import rotation_from_vector
-from ballplate.uncertainty.kernel_quantities import evaluation_points
 from ballplate.uncertainty.pairs import all_pairs
-from ballplate.uncertainty.quantities import QUANTITIES
+from ballplate.uncertainty.quantities import QUANTITIES, evaluation_points
 from ballplate.uncertainty.summaries import point_pairs, uncertainties
 from numpy.typing import NDArray
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import yaml
 from ballplate.extensions.estimators.length_equations import LengthEstimator, length_estimate
-from ballplate.results.checked_designs import predict
+from ballplate.results.checked_files import predict
 from ballplate.results.fitting import fit
 from ballplate.simulator.design.arrays import Design, State, nominal_state
 from ballplate.simulator.design.observations.lengths import Lengths

@@ -8,7 +8,7 @@ import ballplate as bp
 import numpy as np
 import pytest
 import yaml
-from ballplate.results.checked_designs import predict
+from ballplate.results.checked_files import predict
 from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
 from ballplate.simulator.design.observations.readings import reading_blocks

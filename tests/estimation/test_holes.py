@@ -13,7 +13,7 @@ import yaml
 from ballplate import compare
 from ballplate.extensions.diagnosis.redundancy import reliability
 from ballplate.extensions.laboratory.gross_errors import find_gross_errors
-from ballplate.results.checked_designs import predict
+from ballplate.results.checked_files import predict
 from ballplate.results.fitting import fit
 from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.design.parameters import shared_layout

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.results.checked_designs import check
+from ballplate.results.checked_files import check
 from ballplate.results.fitting import fit
 from ballplate.simulator.design.arrays import Design, State, nominal_state
 from ballplate.simulator.design.observations.priors import Priors

@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.simulator.design import objects
-from ballplate.simulator.experiment import inside_checks
+from ballplate.simulator.experiment import bounds
 from ballplate.simulator.experiment.json_schema import schema
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment, Position
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.quantities import QuantityError
-from ballplate.simulator.inputs.room_parts import parse_place
+from ballplate.simulator.inputs.quantity_types import parse_place
 from ballplate.simulator.inputs.yamltree import to_list
 
 from tests.experiment import wording
@@ -102,7 +102,7 @@ def accepts(folder: Path, position: str, end: str) -> bool:
 @pytest.fixture
 def without_play(monkeypatch: pytest.MonkeyPatch) -> None:
     """Let the loader accept no scale readings outside the volume but for rounding."""
-    for module in (objects, inside_checks):
+    for module in (objects, bounds):
         monkeypatch.setattr(module, "SLIGHTLY", 1e-9)
 
 

@@ -21,8 +21,7 @@ from ballplate.simulator.inputs.quantities import (
     parse_ratio,
 )
 from ballplate.simulator.inputs.quantity_types import Length, Ratio, TargetFunction
-from ballplate.simulator.inputs.quantity_words import format_length, typed_length
-from ballplate.simulator.inputs.units import LENGTH_UNITS
+from ballplate.simulator.inputs.units import LENGTH_UNITS, format_length, typed_length
 from hypothesis import given, settings, strategies as st
 from pydantic import TypeAdapter
 

@@ -240,7 +240,7 @@ READERS = {
 }
 
 # What makes their names known, and what writes tables.
-WRITERS = {"simulator/inputs/__init__.py", "simulator/inputs/spreadsheets.py"}
+WRITERS = {"simulator/inputs/__init__.py", "simulator/inputs/decoding.py"}
 
 
 def test_no_other_place_reads_a_table() -> None:

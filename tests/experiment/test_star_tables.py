@@ -11,7 +11,7 @@ import pytest
 import yaml
 from ballplate.simulator.design.observations.star import Star
 from ballplate.simulator.experiment.loading import load
-from ballplate.simulator.experiment.star_tables import doubt_of_table
+from ballplate.simulator.experiment.probes import doubt_of_table
 from scipy.spatial.transform import Rotation
 
 from tests.experiment import wording

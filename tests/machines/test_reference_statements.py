@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.results.checked_designs import predict
+from ballplate.results.checked_files import predict
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
@@ -21,8 +21,7 @@ from ballplate.simulator.machines.kinematic import (
 from ballplate.simulator.machines.metric import MetricModel, SpatialMetricModel
 from ballplate.simulator.machines.protocol import ErrorModel
 from ballplate.simulator.machines.terms import sums
-from ballplate.simulator.machines.true_machine_settings import CoefficientSettings
-from ballplate.simulator.machines.truth import TruthError, true_parameters
+from ballplate.simulator.machines.truth import CoefficientSettings, TruthError, true_parameters
 from scipy.spatial.transform import Rotation
 
 LOWER, UPPER = (-0.2, 0.1, 0.3), (0.8, 0.7, 1.3)

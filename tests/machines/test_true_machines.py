@@ -7,12 +7,14 @@ import pytest
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.kinematic import kinematic_model
 from ballplate.simulator.machines.metric import MetricModel
-from ballplate.simulator.machines.true_machine_settings import (
+from ballplate.simulator.machines.truth import (
     CoefficientSettings,
     RandomSettings,
+    TruthError,
     ZeroSettings,
+    true_machine,
+    true_parameters,
 )
-from ballplate.simulator.machines.truth import TruthError, true_machine, true_parameters
 
 MODEL = kinematic_model(ARRANGEMENTS["MB2"], 5, 5, (0, 0, 0), (1, 1, 1))
 ORIGIN = np.zeros((1, 3))

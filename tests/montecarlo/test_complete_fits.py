@@ -14,10 +14,9 @@ from ballplate.extensions.sweeps.task import trial_figures
 from ballplate.montecarlo import replicates
 from ballplate.montecarlo.accumulator import accumulate
 from ballplate.montecarlo.comparison_tables import trials_data, trials_lines
-from ballplate.montecarlo.complete_fits import replicate_data
 from ballplate.montecarlo.experiments import Trials, true_experiment
 from ballplate.montecarlo.figures import MonteCarloOutcome, outcome
-from ballplate.montecarlo.reference import Reference, reference
+from ballplate.montecarlo.reference import Reference, reference, replicate_data
 from ballplate.montecarlo.replicates import BATCH, _gradient, _refined, _step, draw, estimate_batch
 from ballplate.montecarlo.targets import targets
 from ballplate.simulator.design.arrays import Design

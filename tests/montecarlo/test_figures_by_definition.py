@@ -15,10 +15,9 @@ import numpy as np
 import pytest
 import yaml
 from ballplate.montecarlo.accumulator import Accumulator, accumulate
-from ballplate.montecarlo.complete_fits import complete_fit
 from ballplate.montecarlo.experiments import true_experiment
 from ballplate.montecarlo.figures import outcome
-from ballplate.montecarlo.reference import Reference, Truth, reference
+from ballplate.montecarlo.reference import Reference, Truth, complete_fit, reference
 from ballplate.montecarlo.replicates import Estimates, draw, estimate_batch
 from ballplate.montecarlo.targets import MonteCarloQuantity, targets
 from ballplate.montecarlo.trial_runs import TASK, accuracy_of, run_trials
@@ -27,8 +26,7 @@ from ballplate.simulator.design.observations.coordinates import CalibratedCoordi
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.estimation.functions import Parameters
 from ballplate.simulator.geometry.motions import vector_from_rotation
-from ballplate.uncertainty.kernel_quantities import QuantityKind
-from ballplate.uncertainty.quantities import QUANTITIES
+from ballplate.uncertainty.quantities import QUANTITIES, QuantityKind
 from numpy.typing import NDArray
 from scipy import stats
 

@@ -14,7 +14,7 @@ from ballplate.extensions.estimators.length_equations import LengthEstimator, le
 from ballplate.montecarlo.experiments import true_experiment
 from ballplate.montecarlo.reference import Truth, reference
 from ballplate.montecarlo.replicates import BATCH, estimate_batch
-from ballplate.results.checked_designs import predict
+from ballplate.results.checked_files import predict
 from ballplate.results.fitting import fit
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.lengths import Lengths

@@ -63,7 +63,7 @@ def _serve(connection: Connection, trial: Trial, memory: int) -> None:
     """
     import ballplate.extensions.estimators.distances
     import ballplate.montecarlo.experiments
-    import ballplate.results.checked_designs  # noqa: F401
+    import ballplate.results.checked_files  # noqa: F401
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGPROF, _out_of_time)

@@ -36,11 +36,10 @@ from ballplate.simulator.estimation import (
     linear_functions,
     linearised_fit,
 )
-from ballplate.simulator.experiment import Experiment
+from ballplate.simulator.experiment import LEAST_SIGMA, Experiment
 from ballplate.simulator.geometry import AXIS_NAMES
 from ballplate.simulator.inputs import refused
 from ballplate.simulator.machines import Array, Integers
-from ballplate.simulator.maps import LEAST_SIGMA
 from ballplate.simulator.readings import ObservedReadings
 
 from ..machine_files import campaign_sigmas

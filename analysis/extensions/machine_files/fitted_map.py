@@ -8,11 +8,12 @@ from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
+from ballplate.results import LackOfFit
 from ballplate.simulator.computing import TOUCHED, blank, eigh, svd
 from ballplate.simulator.design import Probes, Volume
+from ballplate.simulator.experiment import LEAST_SIGMA, MapData
 from ballplate.simulator.geometry import AXIS_NAMES
 from ballplate.simulator.machines import Array, ErrorModel, Integers, Parameter, Unit
-from ballplate.simulator.maps import LEAST_SIGMA, LackOfFit, MapData
 
 # Eigenvalues of correlations below this, in parts of the largest, are rounding.
 ROUNDING = 1e-13

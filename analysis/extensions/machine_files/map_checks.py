@@ -6,8 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from ballplate.results import LackOfFit
 from ballplate.simulator.design import Probes, Volume
-from ballplate.simulator.experiment import check_ends, check_installed
+from ballplate.simulator.experiment import MapData, check_ends, check_installed
 from ballplate.simulator.inputs import (
     ExperimentError,
     Mapping as MappingNode,
@@ -28,7 +29,6 @@ from ballplate.simulator.machines import (
     build_error_model,
     kind_of,
 )
-from ballplate.simulator.maps import LackOfFit, MapData
 
 from .fitted_map import FittedMap, LeftOut
 from .map_content import AXES, checksum_of

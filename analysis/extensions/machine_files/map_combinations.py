@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from ballplate.simulator.computing import eigh
+from ballplate.simulator.experiment import LEAST_SIGMA, EarlierCampaign
 from ballplate.simulator.machines import Array, Integers
-from ballplate.simulator.maps import LEAST_SIGMA, EarlierCampaign
 
 from .fitted_map import FittedMap, determined_only
 

@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from ballplate.results import verdict_content
+from ballplate.simulator.experiment import MapData
 from ballplate.simulator.inputs import provider, shipped, to_list
 from ballplate.simulator.machines import KINDS, Array
-from ballplate.simulator.maps import MapData, verdict_content
 
 from .fitted_map import FittedMap
 from .model_files import fingerprints, relative

@@ -9,8 +9,8 @@ import numpy as np
 from ballplate.results import Fit, ParameterEstimate
 from ballplate.simulator.computing import single_threaded
 from ballplate.simulator.design import Probes
+from ballplate.simulator.experiment import MapData
 from ballplate.simulator.inputs import listing, number_of, parse_day, service, to_python, written
-from ballplate.simulator.maps import MapData
 from ballplate.simulator.readings import ObservedReadings, fingerprint, position_fingerprints
 
 from .fitted_map import FittedMap, LeftOut, determined_only

@@ -7,7 +7,7 @@ from datetime import date
 
 import numpy as np
 from ballplate.simulator.design import Machine, References, Volume
-from ballplate.simulator.experiment import MapPriorSettings, Prior, Probe
+from ballplate.simulator.experiment import MapPriorSettings, MapShare, Prior, Probe
 from ballplate.simulator.geometry import even_grid
 from ballplate.simulator.inputs import (
     ExperimentError,
@@ -18,7 +18,6 @@ from ballplate.simulator.inputs import (
     parse_day,
 )
 from ballplate.simulator.machines import Array, ErrorModel
-from ballplate.simulator.maps import MapShare
 
 from .fitted_map import FittedMap
 from .map_combinations import campaign_of, determined_combinations, marginal_of

@@ -18,9 +18,8 @@ from ballplate.simulator.estimation import (
     iterate,
     linearised_fit,
 )
-from ballplate.simulator.experiment import Experiment
+from ballplate.simulator.experiment import LEAST_SIGMA, EarlierCampaign, Experiment
 from ballplate.simulator.machines import Array
-from ballplate.simulator.maps import LEAST_SIGMA, EarlierCampaign
 from ballplate.simulator.readings import ObservedReadings
 
 # Level of the two-sided F-test of two sigmas, as Bozivich, Bancroft and Hartley (1956) recommend

@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.results import Fit
+from ballplate.results import Fit, LackOfFit
 from ballplate.simulator.computing import svd
 from ballplate.simulator.design import Volume
+from ballplate.simulator.experiment import MapData
 from ballplate.simulator.geometry import cross_matrices, pose_size
 from ballplate.simulator.inputs import LengthFunction, number_of
 from ballplate.simulator.machines import Array, ErrorModel, HasLines, PlaneModel
-from ballplate.simulator.maps import LackOfFit, MapData
 from ballplate.simulator.readings import position_fingerprints
 
 from ..machine_files import MachineDescription, data_of

@@ -17,13 +17,12 @@ from ballplate.presentation import (
     records,
     table_lines,
 )
-from ballplate.results import few_degrees_of_freedom, freedom_words
+from ballplate.results import few_degrees_of_freedom, freedom_words, verdict_data, verdict_line
 from ballplate.simulator.computing import single_threaded
 from ballplate.simulator.design import Flags, Tasks
 from ballplate.simulator.geometry import AXIS_NAMES
 from ballplate.simulator.inputs import CsvWriter, listing, number_of
 from ballplate.simulator.machines import Array
-from ballplate.simulator.maps import verdict_data, verdict_line
 from ballplate.uncertainty import stretches
 
 from ..machine_files import FittedMap, left_out_words

@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ballplate.presentation import Data, picked
-from ballplate.results import few_degrees_of_freedom
+from ballplate.results import few_degrees_of_freedom, verdict_data, verdict_line
 from ballplate.simulator.design import Volume
 from ballplate.simulator.inputs import Message, number_of
 from ballplate.simulator.machines import Arrangement
-from ballplate.simulator.maps import verdict_data, verdict_line
 
 from ..machine_files import FittedMap, left_out_words, load_machine, read_map
 from .volumetric_errors import Volumetric

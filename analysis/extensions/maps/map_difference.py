@@ -12,11 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from ballplate.presentation import Data, Result, aligned, number, picked, records, table_lines
-from ballplate.results import FEW
+from ballplate.results import FEW, verdict_data, verdict_line
 from ballplate.simulator.computing import comparable
 from ballplate.simulator.inputs import listing
 from ballplate.simulator.machines import Array
-from ballplate.simulator.maps import verdict_data, verdict_line
 
 from ..machine_files import InCommon, readings_in_common
 from .campaign_tests import TOO_ALIKE, TOO_RARE, JointDifference

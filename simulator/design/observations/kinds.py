@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Union, get_args
 
 from ballplate.simulator.inputs.extensions import provided
 from ballplate.simulator.inputs.messages import Steps
-from ballplate.simulator.inputs.open_kinds import OpenKinds
 from ballplate.simulator.inputs.settings import Settings
+from ballplate.simulator.inputs.validation import OpenKinds
 
 from ..lookup import References
 from .calibration import Calibration

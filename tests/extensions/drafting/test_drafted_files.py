@@ -15,8 +15,7 @@ from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.settings import build_error_model
-from ballplate.simulator.machines.true_machine_settings import RandomSettings
-from ballplate.simulator.machines.truth import true_parameters
+from ballplate.simulator.machines.truth import RandomSettings, true_parameters
 
 from tests.extensions.drafting import wording
 from tests.extensions.drafting.sheets import BRIDGE, FLAT, SHEETS, furthest, options, spans, whole

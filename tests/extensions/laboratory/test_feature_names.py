@@ -9,7 +9,7 @@ import pytest
 from ballplate.cli import main
 from ballplate.extensions.laboratory.feature_names import named, position_of_file
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.experiment.name_rules import check_rule
+from ballplate.simulator.experiment.readings_section import check_rule
 from ballplate.simulator.inputs.messages import ExperimentError
 
 from tests.extensions.laboratory import wording

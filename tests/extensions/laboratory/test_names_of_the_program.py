@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from ballplate.cli import main
 from ballplate.extensions.laboratory.feature_names import named
-from ballplate.simulator.experiment.name_rules import check_rule
+from ballplate.simulator.experiment.readings_section import check_rule
 from ballplate.simulator.inputs.messages import ExperimentError
 
 from tests.extensions.laboratory import makers

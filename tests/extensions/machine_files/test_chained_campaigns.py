@@ -18,8 +18,8 @@ from ballplate.extensions.machine_files.sigmas_by_campaign import compared
 from ballplate.results.fitting import fit
 from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.gauss_newton import moved
+from ballplate.simulator.experiment.earlier_campaigns import EarlierCampaign
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.maps.map_prior import EarlierCampaign
 from ballplate.simulator.readings.generate import Simulated, simulated_readings
 from ballplate.simulator.readings.observed_readings import ObservedReadings, observe
 from scipy import linalg, stats

@@ -7,13 +7,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from ballplate.results.checked_designs import check
+from ballplate.results.checked_files import check
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import AtMost, Candidate, Experiment, Pool, Position
 from ballplate.simulator.experiment.pool import placed_only
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.quantities import parse_length
-from ballplate.simulator.inputs.quantity_words import length_text
+from ballplate.simulator.inputs.units import length_text
 from hypothesis import given, strategies as st
 
 from tests.experiment import wording

@@ -23,7 +23,7 @@ from ballplate.extensions.reproduction.shipped import (
     sums_of_squares,
 )
 from ballplate.rank.verdicts import Verdict
-from ballplate.results.checked_designs import check
+from ballplate.results.checked_files import check
 from ballplate.results.fits import Fit
 from ballplate.simulator.experiment.model import Experiment
 
