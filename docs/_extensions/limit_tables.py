@@ -14,8 +14,7 @@ from ballplate.extensions.requirements import root_search
 from ballplate.extensions.splines import error_curve, read_points
 from ballplate.extensions.sweeps import axes, bundle, load, sweep_settings
 from ballplate.montecarlo import trial_runs
-from ballplate.simulator.design import lookup
-from ballplate.simulator.design.observations import distances, joint_values
+from ballplate.simulator.design.observations import calibration, joint_values
 from ballplate.simulator.experiment import (
     priors,
     references,
@@ -23,7 +22,7 @@ from ballplate.simulator.experiment import (
     size_checks,
     variants,
 )
-from ballplate.simulator.geometry import artefacts
+from ballplate.simulator.experiment.artefacts import MOST_BALLS, MOST_BALLS_OF_ALL
 from ballplate.simulator.geometry.axes import MOST_DIRECTIONS
 from ballplate.simulator.inputs import decoding, messages, settings, tables, yamltree
 from sphinx.application import Sphinx
@@ -44,13 +43,13 @@ LIMITS = {
         "files that a sweep takes along, MB": (bundle.MOST_BYTES // MEGABYTE,),
     },
     "experiments": {
-        "readings, repeats counted": (lookup.MOST_READINGS,),
+        "readings, repeats counted": (references.MOST_READINGS,),
         "balls of an artefact, and of all artefacts": (
-            artefacts.MOST_BALLS,
-            references.MOST_BALLS_OF_ALL,
+            MOST_BALLS,
+            MOST_BALLS_OF_ALL,
         ),
         "shared parameters: poses, machine errors, probe offsets": (size_checks.MOST_SHARED,),
-        "balls that calibrated distances tie together": (distances.MOST_TIED_BALLS,),
+        "balls that calibrated distances tie together": (calibration.MOST_TIED_BALLS,),
         "correlated values of one calibration item": (joint_values.MOST_JOINT_VALUES,),
         "lengths of standards, one for each position and probe": (size_checks.MOST_LENGTHS,),
         "lengths of one standard that share balls": (size_checks.MOST_JOINT_LENGTHS,),

@@ -2,7 +2,6 @@
 from .arrays import (
     Design as Design,
     Observations as Observations,
-    Readings as Readings,
     Rows as Rows,
     State as State,
     disturbed_readings as disturbed_readings,
@@ -19,19 +18,14 @@ from .influence_quantities import (
     Disturbed as Disturbed,
     Influence as Influence,
     InfluenceParameter as InfluenceParameter,
-    InfluenceSettings as InfluenceSettings,
     or_unknown as or_unknown,
-)
-from .lookup import (
-    Indices as Indices,
-    References as References,
-    lengths_per_axis as lengths_per_axis,
 )
 from .objects import (
     SLIGHTLY as SLIGHTLY,
     Flags as Flags,
     Machine as Machine,
     Probes as Probes,
+    Readings as Readings,
     Tasks as Tasks,
     Volume as Volume,
 )
@@ -43,9 +37,7 @@ from .observations.calibration import (
     CertifiedValue as CertifiedValue,
     far_from_drawing as far_from_drawing,
 )
-from .observations.certificate_tables import read_rows as read_rows
 from .observations.coordinates import (
-    CalibratedBalls as CalibratedBalls,
     CalibratedCoordinates as CalibratedCoordinates,
     CoordinateCalibration as CoordinateCalibration,
 )
@@ -55,7 +47,6 @@ from .observations.distances import (
 )
 from .observations.joint_lengths import equation_root as equation_root
 from .observations.joint_values import JointValues as JointValues
-from .observations.kinds import is_of_machine as is_of_machine
 from .observations.lengths import (
     Lengths as Lengths,
     length_derivative as length_derivative,
@@ -76,16 +67,6 @@ from .observations.readings import (
     seen_places as seen_places,
 )
 from .observations.star import Stars as Stars
-from .observations.stated_values import (
-    CertificateEntry as CertificateEntry,
-    CertificateSettings as CertificateSettings,
-    FileValues as FileValues,
-    check_keys as check_keys,
-    is_digital as is_digital,
-    read_digital as read_digital,
-    uncertainties_of as uncertainties_of,
-    value_name as value_name,
-)
 from .observations.whitening import (
     EXACT as EXACT,
     CovarianceRoot as CovarianceRoot,

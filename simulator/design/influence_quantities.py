@@ -11,16 +11,13 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar, get_args
+from typing import get_args
 
 import numpy as np
-from ballplate.simulator.inputs.messages import Steps
-from ballplate.simulator.inputs.settings import Settings, listing
+from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.inputs.units import Units
-from ballplate.simulator.inputs.validation import OpenKinds
 from ballplate.simulator.machines.protocol import Array, Integers, Unit
 
-from .lookup import References
 from .objects import Artefacts, Balls, Machine, Positions, Probes, Readings
 
 
@@ -119,31 +116,6 @@ class Influence(ABC):
 def or_unknown(uncertainty: float | None) -> float:
     """Return a standard uncertainty, infinite if none is stated."""
     return np.inf if uncertainty is None else uncertainty
-
-
-class InfluenceSettings(Settings):
-    """Settings of one influence quantity, with a `kind` of its own.
-
-    If it is `in_order` it depends on the time of readings: a plan chooses without it.
-    """
-
-    in_order: ClassVar[bool] = False
-
-    def check(self, steps: Steps, positions: Mapping[str, str], references: References) -> None:
-        """Report faults, given `positions`: names with those of their artefacts."""
-
-    def influence(self, design: DesignParts) -> Influence:
-        """Return the influence quantity in a design.
-
-        :raises ValueError: the design lacks data that it needs.
-        """
-        raise NotImplementedError
-
-
-if TYPE_CHECKING:
-    AnyInfluence = InfluenceSettings
-else:
-    AnyInfluence = Annotated[InfluenceSettings, OpenKinds("influences", InfluenceSettings)]
 
 
 # Readings by which a kind is checked. More than there are axes, so that axes are not taken for

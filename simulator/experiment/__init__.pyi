@@ -11,7 +11,10 @@ from .bounds import (
     occupied as occupied,
     shared as shared,
 )
+from .calibrated_coordinates import CalibratedBalls as CalibratedBalls
+from .calibration_kinds import is_of_machine as is_of_machine
 from .calibrations import resolve_calibration as resolve_calibration
+from .certificate_tables import read_rows as read_rows
 from .changes import node_of as node_of
 from .earlier_campaigns import (
     LEAST_SIGMA as LEAST_SIGMA,
@@ -19,6 +22,7 @@ from .earlier_campaigns import (
     MapData as MapData,
     MapShare as MapShare,
 )
+from .influence_settings import InfluenceSettings as InfluenceSettings
 from .json_schema import DRAFT as DRAFT, schema as schema, tidied as tidied
 from .layout import lay_out as lay_out
 from .loading import build as build, load as load, trees_of as trees_of, with_pool as with_pool
@@ -69,6 +73,7 @@ from .readings_section import (
     ReadingsSettings as ReadingsSettings,
     check_rule as check_rule,
 )
+from .references import References as References, lengths_per_axis as lengths_per_axis
 from .sections import (
     Line as Line,
     MapPriorSettings as MapPriorSettings,
@@ -77,6 +82,16 @@ from .sections import (
 )
 from .size_checks import check_lengths as check_lengths
 from .spans import unspanned as unspanned
+from .stated_values import (
+    CertificateEntry as CertificateEntry,
+    CertificateSettings as CertificateSettings,
+    FileValues as FileValues,
+    check_keys as check_keys,
+    is_digital as is_digital,
+    read_digital as read_digital,
+    uncertainties_of as uncertainties_of,
+    value_name as value_name,
+)
 from .structure import Sections as Sections
 from .variants import (
     is_same_place as is_same_place,

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.design.lookup import Indices, References
 from ballplate.simulator.design.objects import SLIGHTLY, Machine, Volume
 from ballplate.simulator.geometry.ball_layouts import BallLayout, frozen
 from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.geometry.positions import AXIS_INDEX, Pose, ball_coordinates, corners
 from ballplate.simulator.inputs.messages import Steps
-from ballplate.simulator.inputs.number_arrays import Array
+from ballplate.simulator.inputs.number_arrays import Array, Indices
 from ballplate.simulator.inputs.problems import Problems
 from ballplate.simulator.inputs.settings import hint, number_of
 from ballplate.simulator.inputs.units import format_length
@@ -21,6 +20,7 @@ from ballplate.simulator.inputs.yamltree import Mark
 
 from .model import Position, Probe
 from .pool_sections import LimitsSettings, Region
+from .references import References
 from .structure import Sections
 
 TOLERANCE = 1e-9

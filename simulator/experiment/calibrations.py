@@ -6,16 +6,16 @@ from collections import Counter
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.design.lookup import References
 from ballplate.simulator.design.observations.balls import BallObservations
 from ballplate.simulator.design.observations.calibration import Calibration
-from ballplate.simulator.design.observations.distances import DistancesSettings
-from ballplate.simulator.design.observations.kinds import read_calibration
-from ballplate.simulator.design.observations.radius import RadiusSettings
 from ballplate.simulator.geometry.artefacts import BallLayout, BryanGaugeSettings
 from ballplate.simulator.inputs.messages import Steps
 from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.machines.protocol import Array
+
+from .calibrated_distances import DistancesSettings
+from .calibration_kinds import RadiusSettings, read_calibration
+from .references import References
 
 
 def resolve_calibration(settings: Any, steps: Steps, references: References) -> Calibration | None:

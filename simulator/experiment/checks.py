@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping
 
 import numpy as np
-from ballplate.simulator.design.lookup import References
 from ballplate.simulator.design.observations.calibration import Calibration
 from ballplate.simulator.design.observations.distances import DistanceCalibration
 from ballplate.simulator.design.observations.radius import RadiusCalibration
@@ -15,6 +14,7 @@ from ballplate.simulator.inputs.problems import Problems, written_text
 from ballplate.simulator.inputs.settings import listing
 
 from .model import Position
+from .references import References
 from .structure import Sections
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from ballplate.simulator.design.lookup import References
 from ballplate.simulator.design.objects import Machine
 from ballplate.simulator.inputs.extensions import provided
 from ballplate.simulator.inputs.messages import ExperimentError, Steps
@@ -20,6 +19,7 @@ from ballplate.simulator.machines.truth import (
     true_machine,
 )
 
+from .references import References
 from .structure import Sections
 
 _TRUE_MODEL = ("true_machine", "error_model")

@@ -15,17 +15,17 @@ from ballplate.simulator.design.arrays import (
 )
 from ballplate.simulator.design.influence_quantities import (
     InfluenceParameter,
-    InfluenceSettings,
     few,
     wrong_of_parameters,
     wrong_of_shifts,
 )
-from ballplate.simulator.design.lookup import References
 from ballplate.simulator.design.observations.priors import Priors
+from ballplate.simulator.experiment.influence_settings import InfluenceSettings
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.protocol import Integers
 
 from .model import Experiment, Position
+from .references import References
 from .size_checks import MOST_SHARED
 from .structure import Sections
 

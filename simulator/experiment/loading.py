@@ -27,6 +27,7 @@ from ballplate.simulator.inputs.yamltree import (
 from ballplate.simulator.machines.settings import with_defaults
 from ballplate.simulator.machines.truth import with_model_defaults
 
+from .artefacts import resolve_references
 from .bounds import check_inside, resolve_bounds
 from .calibrations import resolve_calibration
 from .changes import node_of
@@ -42,7 +43,6 @@ from .priors import resolve_priors
 from .probes import resolve_probes, resolve_stars
 from .readings_checks import check_readings
 from .readings_section import no_settings
-from .references import resolve_references
 from .size_checks import check_size
 from .spans import unspanned
 from .structure import validate_sections

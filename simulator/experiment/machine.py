@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.design.lookup import References
 from ballplate.simulator.design.noise import Noise, NoiseSettings
 from ballplate.simulator.design.objects import Machine, Volume
 from ballplate.simulator.geometry.ball_layouts import frozen
@@ -22,6 +21,7 @@ from ballplate.simulator.inputs.units import format_length, typed_length
 
 from .bounds import TOLERANCE, check_points
 from .model import Evaluation, Probe, Task
+from .references import References
 from .sections import MOST_POINTS, MachineSettings, PointsSettings, TaskSettings
 from .structure import Sections
 

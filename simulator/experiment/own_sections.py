@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from ballplate.simulator.design.lookup import References
 from ballplate.simulator.inputs.extensions import (
     MissingExtensionError,
     is_installed,
@@ -17,6 +16,7 @@ from ballplate.simulator.inputs.extensions import (
 from ballplate.simulator.inputs.messages import Steps
 from ballplate.simulator.inputs.problems import Problems
 
+from .references import References
 from .structure import KEYS, Sections
 
 

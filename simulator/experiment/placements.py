@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any, Literal
 
 import numpy as np
-from ballplate.simulator.design.lookup import References, lengths_per_axis
 from ballplate.simulator.geometry.ball_layouts import BallLayout
 from ballplate.simulator.geometry.positions import (
     AXIS_INDEX,
@@ -22,6 +21,7 @@ from ballplate.simulator.inputs.quantity_types import Place, RoomPart, length_of
 from .bounds import Bounds, edge_of, limits_of, shared
 from .model import Position, ReadingGroup
 from .position_sections import PositionSettings, ReadingSettings
+from .references import References, lengths_per_axis
 
 # A plane of holes is across an axis if its normal has that axis' direction to within this.
 OBLIQUE = 1e-12

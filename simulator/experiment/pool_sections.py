@@ -5,8 +5,6 @@ from __future__ import annotations
 from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, Union
 
-from ballplate.simulator.design.observations.coordinates import CalibratedBalls
-from ballplate.simulator.design.observations.kinds import CALIBRATIONS
 from ballplate.simulator.geometry.ball_layouts import Name
 from ballplate.simulator.geometry.positions import Axis
 from ballplate.simulator.inputs.quantity_types import Duration, Length, Place, RoomPart
@@ -14,6 +12,8 @@ from ballplate.simulator.inputs.settings import Forms, NonEmpty, Settings, Sever
 from ballplate.simulator.inputs.validation import OpenKinds
 from pydantic import Discriminator, Field, Tag, create_model, model_validator
 
+from .calibrated_coordinates import CalibratedBalls
+from .calibration_kinds import CALIBRATIONS
 from .position_sections import Count, LengthPerAxis, PositionSettings, ProbeNames, QuarterTurns
 
 GROUP_KEYS = ("planes", "levels", "corners", "centres")

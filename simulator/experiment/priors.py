@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from ballplate.simulator.design.lookup import References
 from ballplate.simulator.design.objects import Machine
 from ballplate.simulator.geometry.artefacts import BryanGaugeSettings
 from ballplate.simulator.geometry.motions import AXIS_NAMES, pose_parameter_names
@@ -19,6 +18,7 @@ from ballplate.simulator.machines.settings import build_error_model, kind_of
 
 from .model import Position, Prior, Probe
 from .own_sections import needed_service
+from .references import References
 from .sections import MapPriorSettings, PriorSettings
 from .structure import Sections
 

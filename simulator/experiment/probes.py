@@ -7,7 +7,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from ballplate.simulator.design.lookup import References, lengths_per_axis
 from ballplate.simulator.design.observations.star import Star
 from ballplate.simulator.geometry.ball_layouts import frozen
 from ballplate.simulator.geometry.motions import rotation_matrix
@@ -17,9 +16,10 @@ from ballplate.simulator.inputs.settings import hint, listing
 from ballplate.simulator.inputs.tables import read_table
 from ballplate.simulator.inputs.yamltree import written
 
+from .artefacts import DEFAULT_PROBE
 from .model import Probe
 from .position_sections import HeadSettings, ProbeSettings, StarSettings
-from .references import DEFAULT_PROBE
+from .references import References, lengths_per_axis
 from .structure import Sections
 
 # Stated offsets are nominal, and wrong by this much in metres before anybody need be told.

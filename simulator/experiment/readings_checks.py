@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import codecs
 
-from ballplate.simulator.design.lookup import References
 from ballplate.simulator.inputs.messages import ExperimentError, Steps
 from ballplate.simulator.inputs.quantities import QuantityError, parse_positive_length
 from ballplate.simulator.inputs.settings import hint
@@ -12,6 +11,7 @@ from ballplate.simulator.inputs.units import LENGTH_UNITS, plain_unit
 
 from .own_sections import needed_service
 from .readings_section import ColumnsSettings, CompensationSettings, ReadingsSettings, check_rule
+from .references import References
 from .structure import Sections
 
 AXES = ("x", "y", "z")

@@ -1,156 +1,211 @@
-"""References of positions and calibrations to artefacts, probes and balls by name."""
+"""What a file refers to by name: artefacts, their balls, and probes."""
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from ballplate.simulator.design.lookup import References
-from ballplate.simulator.geometry.artefacts import BallsSettings, BryanGaugeSettings
-from ballplate.simulator.geometry.ball_layouts import (
-    MOST_BALLS,
-    ArtefactSettings,
-    BallLayout,
-    LayoutError,
-    coincident_balls,
-)
-from ballplate.simulator.inputs.messages import ExperimentError, Steps
-from ballplate.simulator.inputs.own_code import Trust
-from ballplate.simulator.inputs.problems import Problems, written_keys
-from ballplate.simulator.inputs.settings import hint, shorten
-from ballplate.simulator.inputs.tables import read_table
-from ballplate.simulator.inputs.units import format_length
-from ballplate.simulator.inputs.yamltree import Mapping, Node, Sequence as SequenceNode, written
+from ballplate.simulator.design.objects import Volume
+from ballplate.simulator.geometry.ball_layouts import ArtefactSettings, BallLayout, corners, frozen
+from ballplate.simulator.inputs.messages import Step, Steps
+from ballplate.simulator.inputs.number_arrays import Array, Indices
+from ballplate.simulator.inputs.own_code import UNKNOWN, Trust
+from ballplate.simulator.inputs.problems import Problems, written_text
+from ballplate.simulator.inputs.settings import hint, listing, shorten
+from ballplate.simulator.inputs.yamltree import Sequence as SequenceNode, written
 
-from .structure import Sections
-
-DEFAULT_PROBE = "probe"
-
-# Of all artefacts together.
-MOST_BALLS_OF_ALL = 100_000
+# Of all positions with their repeats: half a million readings take half a gigabyte.
+MOST_READINGS = 2_000_000
 
 
-def resolve_references(
-    sections: Sections, folder: Path, problems: Problems, trust: Trust
-) -> References:
-    """Return what positions and calibrations can refer to; tables of balls are read from
-    ``folder``.
+@dataclass(frozen=True, eq=False)
+class References:
+    """Objects that can be referred to.
+
+    ``probes`` and ``artefact_names`` are names as written, also of invalid entries; ``artefacts``
+    and ``layouts`` have only valid ones. ``dimension`` and ``volume`` may be missing from the file
+    or invalid.
     """
-    root = problems.root
-    dimension = _dimension(root)
-    probes = written_keys(root, "probes")
-    if not probes and written(root, "probes") is None and dimension in (2, None):
-        probes = (DEFAULT_PROBE,)
-    artefacts = {}
-    layouts = {}
-    balls = 0
-    for key, settings in sections.entries("artefacts").items():
-        name, steps = str(key), ("artefacts", str(key))
-        listed = _with_coordinates(settings, folder, steps, problems, trust)
-        if listed is None:
-            continue
-        try:
-            layout = listed.layout()
-        except LayoutError as error:
-            problems.add(steps, f'kind "{settings.kind}" has a wrong layout: {error}')
-            continue
-        balls += len(layout.names)
-        if balls > MOST_BALLS_OF_ALL:
-            text = (
-                f"there are {balls} balls up to here; at most {MOST_BALLS_OF_ALL} of all artefacts"
-                " are possible"
-            )
-            problems.add(steps, text)
-            break
-        where = (*steps, "directions" if isinstance(listed, BryanGaugeSettings) else "coordinates")
-        twins = coincident_balls(layout)
-        for i, j in twins[:3]:
-            text = (
-                f'balls "{layout.names[i]}" and "{layout.names[j]}" have the same location;'
-                " correct one of them"
-            )
-            problems.add(where, text)
-        if dimension == 2 and np.any(layout.coordinates[:, 2]):
-            high = int(np.flatnonzero(layout.coordinates[:, 2])[0])
-            text = (
-                f'ball "{layout.names[high]}" has the third co-ordinate'
-                f" {format_length(layout.coordinates[high, 2])}, but the experiment is"
-                " two-dimensional; give two co-ordinates, or machine.volume a z axis"
-            )
-            problems.add(where, text)
-        elif not twins:
-            artefacts[name], layouts[name] = listed, layout
-        if listed.reads == "in plane":
-            text = "only a plate in space is read in its plane; remove it, and flatness"
-            if listed.role != "plate" or dimension == 2:
-                problems.add((*steps, "reads"), text)
-        if listed.axes is not None:
-            _check_axes(listed, layout, (*steps, "axes"), dimension, problems)
-    names = written_keys(root, "artefacts")
-    return References(problems, folder, dimension, probes, names, artefacts, layouts, trust)
 
+    problems: Problems
+    folder: Path
+    dimension: int | None
+    probes: tuple[str, ...]
+    artefact_names: tuple[str, ...]
+    artefacts: dict[str, ArtefactSettings]
+    layouts: dict[str, BallLayout]
+    trust: Trust = UNKNOWN
+    volume: Volume | None = None
+    tally: Counter[str] = field(default_factory=Counter)
 
-def _check_axes(
-    settings: ArtefactSettings,
-    layout: BallLayout,
-    steps: Steps,
-    dimension: int | None,
-    problems: Problems,
-) -> None:
-    """Report axes of an artefact without axes, or through unknown balls."""
-    assert settings.axes is not None
-    if settings.role != "plate":
-        problems.add(steps, "a length standard's balls are not estimated; remove its axes")
-    elif dimension == 3:
-        text = (
-            "axes are those of a plate in two dimensions; remove them, or the z axis of"
-            " machine.volume"
+    def file(self, name: object) -> Path:
+        """Return the file that the experiment names.
+
+        :raises ExperimentError: it is outside the permitted folders.
+        """
+        return self.trust.file(self.folder, name)
+
+    def count_readings(self, count: int, steps: Steps) -> bool:
+        """Count further readings; return false, after one message, if there are too many."""
+        before = self.tally["readings"]
+        self.tally["readings"] += count
+        if before <= MOST_READINGS < self.tally["readings"]:
+            text = (
+                f"there are {self.tally['readings']} readings up to here, repeats counted; at most"
+                f" {MOST_READINGS} are possible: read fewer balls, or less often"
+            )
+            self.problems.add(steps, text)
+        return self.tally["readings"] <= MOST_READINGS
+
+    def artefact(self, name: str | None, steps: Steps) -> str | None:
+        """Return the artefact of a position or calibration, or report faults."""
+        if name is None:
+            if len(self.artefact_names) > 1:
+                choice = listing(self.artefact_names)
+                self.problems.add(
+                    (*steps, "artefact"), f'missing; add "artefact", one of: {choice}'
+                )
+            return self.artefact_names[0] if len(self.artefact_names) == 1 else None
+        if name not in self.artefact_names:
+            self.problems.add(
+                (*steps, "artefact"),
+                f'unknown artefact "{name}"; {hint(name, self.artefact_names)}',
+            )
+            return None
+        return name
+
+    def check_written(self, steps: Steps) -> None:
+        """Report unknown names in an invalid position or calibration."""
+        name = written_text(self.problems.root, *steps, "artefact")
+        if name is not None:
+            self.artefact(name, steps)
+        probes = written(self.problems.root, *steps, "probes")
+        for i in range(len(probes.items)) if isinstance(probes, SequenceNode) else ():
+            probe = written_text(self.problems.root, *steps, "probes", i)
+            if probe is not None and probe not in self.probes:
+                self.problems.add(
+                    (*steps, "probes", i), f'unknown probe "{probe}"; {hint(probe, self.probes)}'
+                )
+
+    def probe_names(self, names: tuple[str, ...] | None, steps: Steps) -> tuple[str, ...] | None:
+        """Return the probes of a reading, or report faults."""
+        if names is None:
+            if len(self.probes) > 1:
+                choice = listing(self.probes)
+                self.problems.add((*steps, "probes"), f'missing; add "probes", some of: {choice}')
+            return self.probes if len(self.probes) == 1 else None
+        return names if self._known_once("probe", self.probes, names, (*steps, "probes")) else None
+
+    def is_not_negative(self, uncertainty: float | None, steps: Steps) -> bool:
+        """True if an uncertainty is absent, zero or above; otherwise a message."""
+        return self.require(
+            uncertainty is None or uncertainty >= 0.0,
+            steps,
+            "is below zero; give it without the sign",
         )
-        problems.add(steps, text)
-    for key in ("origin", "x", "y"):
-        name = getattr(settings.axes, key)
-        if name is not None and name not in layout.names:
-            problems.add(
-                (*steps, key), f'unknown ball "{shorten(name)}"; {hint(name, layout.names)}'
-            )
+
+    def has_axes(self, setting: object, steps: Steps) -> bool:
+        """True unless a stated list has another length than the number of axes; then a message."""
+        count = len(setting) if isinstance(setting, tuple) else self.dimension
+        return self.require(
+            self.dimension in (None, count),
+            steps,
+            f"has {count} axes, but the experiment has {self.dimension}",
+        )
+
+    def is_position(self, name: str, positions: Collection[str], steps: Steps) -> bool:
+        """True if a name is of a position; otherwise a message."""
+        return self.require(
+            name in positions, steps, f'unknown position "{name}"; {hint(name, positions)}'
+        )
+
+    def are_probes(self, names: Sequence[str], steps: Steps) -> bool:
+        """True if names listed at a path are of probes, each once, after reporting faults."""
+        return self._known_once("probe", self.probes, names, steps)
+
+    def balls(self, chosen: Sequence[str], layout: BallLayout, steps: Steps) -> Indices | None:
+        """Return the indices of balls, all, the corners or listed ones, or report faults."""
+        index = {name: i for i, name in enumerate(layout.names)}
+        if chosen == "all":
+            indices = np.arange(len(index))
+        elif chosen == "corners":
+            try:
+                indices = corners(layout)
+            except ValueError as error:
+                self.problems.add(steps, str(error))
+                return None
+        elif self._known_once("ball", index, chosen, steps):
+            indices = np.array([index[name] for name in chosen], dtype=np.intp)
+        else:
+            return None
+        indices.setflags(write=False)
+        return indices
+
+    def has_dimension(self, point: Sequence[float], steps: Steps) -> bool:
+        """True if a point has as many co-ordinates as the experiment, after saying where not."""
+        return self.require(
+            self.dimension in (None, len(point)),
+            steps,
+            f"has {len(point)} co-ordinates, but the experiment has {self.dimension} dimensions;"
+            f" give {self.dimension}",
+        )
+
+    def is_in_volume(self, point: Sequence[float], steps: Steps) -> bool:
+        """True if a point has the right number of co-ordinates and lies in the measuring volume,
+        after saying where not.
+        """
+        if not self.has_dimension(point, steps):
+            return False
+        lower, upper = (point, point) if self.volume is None else self.volume.of_readings
+        is_inside = bool(np.all((lower <= np.array(point)) & (np.array(point) <= upper)))
+        return self.require(is_inside, steps, "is outside the measuring volume; correct it")
+
+    def refuse_in_plane(self, *steps: Step) -> None:
+        """Say that a key is one of three dimensions."""
+        self.problems.add(steps, "has no meaning in two dimensions; remove it", of_key=True)
+
+    def _known_once(
+        self, noun: str, names_known: Collection[str], names: Sequence[str], steps: Steps
+    ) -> bool:
+        names_seen = set()
+        before = len(self.problems.messages)
+        for i, name in enumerate(names):
+            if name not in names_known:
+                self.problems.add(
+                    (*steps, i), f'unknown {noun} "{shorten(name)}"; {hint(name, names_known)}'
+                )
+            elif name in names_seen:
+                self.problems.add(
+                    (*steps, i), f'{noun} "{shorten(name)}" is listed twice; remove one of the two'
+                )
+            names_seen.add(name)
+        return len(self.problems.messages) == before
+
+    def require(self, is_right: bool, steps: Steps, text: Callable[[], str] | str) -> bool:
+        """Report a fault unless the condition holds; return the condition."""
+        if not is_right:
+            self.problems.add(steps, text if isinstance(text, str) else text())
+        return is_right
 
 
-def _with_coordinates(
-    settings: ArtefactSettings, folder: Path, steps: Steps, problems: Problems, trust: Trust
-) -> ArtefactSettings | None:
-    if not isinstance(settings, BallsSettings) or settings.file is None:
-        return settings
-    steps = (*steps, "file")
-    try:
-        rows = read_table(trust.file(folder, settings.file), ["ball"], ["x", "y"], ["z"])
-    except ExperimentError as error:
-        problems.take(error, steps)
-        return None
-    coordinates = {}
-    complete = True
-    for row in rows:
-        if row.texts[0] in coordinates:
-            problems.add_at(
-                row.mark,
-                steps,
-                f'ball "{row.texts[0]}" is listed twice; remove one of the two lines',
-            )
-            complete = False
-        coordinates[row.texts[0]] = row.lengths
-    if len(coordinates) > MOST_BALLS:
-        problems.add(steps, f"has {len(coordinates)} balls; at most {MOST_BALLS} are possible")
-        return None
-    return (
-        settings.model_copy(update={"coordinates": coordinates, "file": None}) if complete else None
+def lengths_per_axis(
+    setting: Any, steps: Steps, references: References
+) -> tuple[Array | None, bool]:
+    """Return lengths of all axes (d,), if stated, and whether the statement is valid."""
+    dimension = references.dimension
+    if setting is None or dimension is None:
+        return None, True
+    if isinstance(setting, float):
+        return frozen([setting] * dimension), True
+    listed = setting if isinstance(setting, tuple) else (setting.x, setting.y, setting.z)
+    lengths_given = tuple(length for length in listed if length is not None)
+    text = (
+        f"has {len(lengths_given)} axes, but the experiment has {dimension}; give one length for"
+        " all, or"
+        f" {dimension}"
     )
-
-
-def _dimension(root: Node) -> int | None:
-    """Return the number of axes of the volume as written, even with invalid values."""
-    volume = written(root, "machine", "volume")
-    if isinstance(volume, Mapping):
-        # Neither may be meant where an axis has another name.
-        return 3 if "z" in volume.items else 2 if set(volume.items) <= {"x", "y"} else None
-    if isinstance(volume, SequenceNode) and len(volume.items) in (2, 3):
-        return len(volume.items)
-    return None
+    return frozen(lengths_given), references.require(len(lengths_given) == dimension, steps, text)

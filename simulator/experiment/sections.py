@@ -6,9 +6,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, Self
 
-from ballplate.simulator.design.influence_quantities import AnyInfluence
 from ballplate.simulator.design.noise import Distribution, NoiseSettings
-from ballplate.simulator.design.observations.kinds import CalibrationSettings
 from ballplate.simulator.geometry.artefacts import ARTEFACTS, AnyArtefactSettings
 from ballplate.simulator.geometry.ball_layouts import Coordinates, Name
 from ballplate.simulator.inputs.quantity_types import Day, Length, PositiveLength, TargetFunction
@@ -17,6 +15,8 @@ from ballplate.simulator.machines.settings import ErrorModelSettings
 from ballplate.simulator.machines.truth import TrueMachineSettings, ZeroSettings
 from pydantic import Discriminator, Field, StringConstraints, Tag, model_validator
 
+from .calibration_kinds import CalibrationSettings
+from .influence_settings import AnyInfluence
 from .pool_sections import PoolSettings
 from .position_sections import (
     AnyProbe,

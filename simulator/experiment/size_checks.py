@@ -5,18 +5,19 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping
 
 import numpy as np
-from ballplate.simulator.design.lookup import Indices, References
 from ballplate.simulator.design.objects import Machine
 from ballplate.simulator.design.observations.calibration import Calibration
 from ballplate.simulator.design.observations.distances import DistanceCalibration
 from ballplate.simulator.geometry.artefacts import BryanGaugeSettings
 from ballplate.simulator.geometry.motions import pose_size
 from ballplate.simulator.inputs.messages import Steps
+from ballplate.simulator.inputs.number_arrays import Indices
 from ballplate.simulator.machines.settings import (
     build_error_model,
 )
 
 from .model import Evaluation, Position, Probe
+from .references import References
 from .structure import Sections
 
 # Parameters besides those of the balls: their time grows with the cube of the number, their memory

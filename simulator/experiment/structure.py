@@ -7,8 +7,6 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import Annotated, Any
 
-from ballplate.simulator.design.influence_quantities import AnyInfluence
-from ballplate.simulator.design.observations.kinds import CalibrationSettings
 from ballplate.simulator.geometry.artefacts import AnyArtefactSettings
 from ballplate.simulator.inputs.extensions import MissingExtensionError, names, provided
 from ballplate.simulator.inputs.messages import Steps, UnusableError
@@ -19,6 +17,8 @@ from ballplate.simulator.inputs.wording import LACKING
 from ballplate.simulator.inputs.yamltree import Mapping, Node, Scalar, Sequence, to_python
 from pydantic import TypeAdapter, ValidationError
 
+from .calibration_kinds import CalibrationSettings
+from .influence_settings import AnyInfluence
 from .pool_sections import GroupSettings, ListedSettings, PoolSettings, PricedSettings, is_group
 from .position_sections import AnyProbe, PositionSettings, StarSettings
 from .sections import AnyPrior, ExperimentSettings

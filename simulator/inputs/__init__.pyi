@@ -42,7 +42,7 @@ from .messages import (
     in_one_line as in_one_line,
     refused as refused,
 )
-from .number_arrays import Array as Array, Flags as Flags, Integers as Integers
+from .number_arrays import Array as Array, Flags as Flags, Indices as Indices, Integers as Integers
 from .own_code import (
     OPENED as OPENED,
     UNKNOWN as UNKNOWN,

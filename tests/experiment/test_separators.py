@@ -224,7 +224,7 @@ def test_readings_and_certificates_of_a_campaign(folder: Path, form: str) -> Non
 
 # Where a table is read, by what reads it: a new place belongs among the tables above.
 READERS = {
-    "simulator/design/observations/certificate_tables.py",  # lengths, coordinates, own
+    "simulator/experiment/certificate_tables.py",  # lengths, coordinates, own
     "analysis/extensions/influences/sag.py",
     "simulator/experiment/probes.py",  # star
     "simulator/experiment/machine.py",  # points

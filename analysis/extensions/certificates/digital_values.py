@@ -9,7 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ballplate.simulator.design import CertificateEntry, FileValues, References, value_name
+from ballplate.simulator.experiment import CertificateEntry, FileValues, References, value_name
 from ballplate.simulator.inputs import ExperimentError, Steps, listing, shorten
 
 if TYPE_CHECKING:

@@ -6,7 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.design import Design, InfluenceSettings
+from ballplate.simulator.design import Design
+from ballplate.simulator.experiment import InfluenceSettings
 from ballplate.simulator.machines import Array
 
 from .temperature import ARTEFACT_COLUMN, AXIS_COLUMNS, SCALES_COLUMN, TemperaturesSettings

@@ -18,11 +18,10 @@ from ballplate.simulator.design import (
     Disturbed,
     Influence,
     InfluenceParameter,
-    InfluenceSettings,
     Readings,
-    References,
     or_unknown,
 )
+from ballplate.simulator.experiment import InfluenceSettings, References
 from ballplate.simulator.geometry import AXIS_NAMES, Name
 from ballplate.simulator.inputs import (
     DURATION_UNITS,

@@ -17,10 +17,9 @@ from ballplate.simulator.design import (
     Disturbed,
     Influence,
     InfluenceParameter,
-    InfluenceSettings,
-    References,
     or_unknown,
 )
+from ballplate.simulator.experiment import InfluenceSettings, References
 from ballplate.simulator.geometry import AXIS_NAMES, Name
 from ballplate.simulator.inputs import NonEmpty, Ratio, Steps
 from ballplate.simulator.machines import Array, Integers

@@ -16,10 +16,9 @@ from ballplate.simulator.design import (
     Disturbed,
     Influence,
     InfluenceParameter,
-    InfluenceSettings,
-    References,
     or_unknown,
 )
+from ballplate.simulator.experiment import InfluenceSettings, References
 from ballplate.simulator.geometry import Name
 from ballplate.simulator.inputs import Length, NonEmpty, Steps, hint
 from ballplate.simulator.machines import Array, Integers

@@ -11,7 +11,8 @@ from collections.abc import Mapping
 from typing import Literal
 
 import numpy as np
-from ballplate.simulator.design import DesignParts, InfluenceSettings, References, or_unknown
+from ballplate.simulator.design import DesignParts, or_unknown
+from ballplate.simulator.experiment import InfluenceSettings, References
 from ballplate.simulator.geometry import Name
 from ballplate.simulator.inputs import Length, NonEmpty, Steps
 from pydantic import Field

@@ -11,7 +11,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Literal
 
-from ballplate.simulator.design import DesignParts, InfluenceSettings, References
+from ballplate.simulator.design import DesignParts
+from ballplate.simulator.experiment import InfluenceSettings, References
 from ballplate.simulator.inputs import Length, NonEmpty, Steps
 from pydantic import Field
 

@@ -20,10 +20,9 @@ from ballplate.simulator.design import (
     Flags,
     Influence,
     InfluenceParameter,
-    InfluenceSettings,
-    References,
     or_unknown,
 )
+from ballplate.simulator.experiment import InfluenceSettings, References
 from ballplate.simulator.geometry import Name
 from ballplate.simulator.inputs import (
     Expansion,

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Literal
 
-from ballplate.simulator.design import Machine, References
+from ballplate.simulator.design import Machine
+from ballplate.simulator.experiment import References
 from ballplate.simulator.inputs import ExperimentError, Length, format_length, listing
 from ballplate.simulator.machines import (
     Corner,

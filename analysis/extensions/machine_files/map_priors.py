@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from datetime import date
 
 import numpy as np
-from ballplate.simulator.design import Machine, References, Volume
-from ballplate.simulator.experiment import MapPriorSettings, MapShare, Prior, Probe
+from ballplate.simulator.design import Machine, Volume
+from ballplate.simulator.experiment import MapPriorSettings, MapShare, Prior, Probe, References
 from ballplate.simulator.geometry import even_grid
 from ballplate.simulator.inputs import (
     ExperimentError,

@@ -6,7 +6,8 @@ import hashlib
 from typing import Annotated, Literal
 
 import numpy as np
-from ballplate.simulator.design import Machine, References
+from ballplate.simulator.design import Machine
+from ballplate.simulator.experiment import References
 from ballplate.simulator.inputs import read_bytes
 from ballplate.simulator.machines import Corner, ErrorModel, FurtherTrueMachine, TrueMachine
 from pydantic import Field, PrivateAttr

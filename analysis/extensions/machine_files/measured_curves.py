@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-from ballplate.simulator.design import Machine, References
+from ballplate.simulator.design import Machine
+from ballplate.simulator.experiment import References
 from ballplate.simulator.inputs import ExperimentError, NonEmpty, format_length, listing
 from ballplate.simulator.machines import (
     ARRANGEMENT,

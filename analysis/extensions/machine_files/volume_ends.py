@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ballplate.simulator.design import Machine, References
+from ballplate.simulator.design import Machine
+from ballplate.simulator.experiment import References
 from ballplate.simulator.inputs import Steps, format_length
 from ballplate.simulator.machines import AXES
 

@@ -7,13 +7,13 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ballplate.simulator.design import is_of_machine
 from ballplate.simulator.experiment import (
     Candidate,
     Experiment,
     Pool,
     Position,
     TimesSettings,
+    is_of_machine,
 )
 from ballplate.simulator.inputs import (
     format_duration,

@@ -9,7 +9,7 @@ from itertools import product
 from typing import Any, Literal, get_args
 
 import numpy as np
-from ballplate.simulator.design import SLIGHTLY, References, lengths_per_axis
+from ballplate.simulator.design import SLIGHTLY
 from ballplate.simulator.experiment import (
     OUTSIDE,
     TOLERANCE,
@@ -19,9 +19,11 @@ from ballplate.simulator.experiment import (
     Position,
     RangeSettings,
     ReadingGroup,
+    References,
     check_turns,
     edge_of,
     entered,
+    lengths_per_axis,
     limits_of,
     occupied,
     shared,

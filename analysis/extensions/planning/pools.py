@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.design import Calibration, RadiusCalibration, References
+from ballplate.simulator.design import Calibration, RadiusCalibration
 from ballplate.simulator.experiment import (
     EDGE,
     OUTSIDE,
@@ -26,6 +26,7 @@ from ballplate.simulator.experiment import (
     Pool,
     PoolSettings,
     Position,
+    References,
     Sections,
     SelectorSettings,
     TimesSettings,

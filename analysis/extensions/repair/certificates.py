@@ -6,15 +6,10 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.design import (
-    CoordinateCalibration,
-    DistanceCalibration,
-    Indices,
-    RadiusCalibration,
-)
+from ballplate.simulator.design import CoordinateCalibration, DistanceCalibration, RadiusCalibration
 from ballplate.simulator.experiment import Experiment
 from ballplate.simulator.geometry import BallLayout, BryanGaugeSettings, TwoSpheresSettings, pairs
-from ballplate.simulator.inputs import LengthFunction, format_length
+from ballplate.simulator.inputs import Indices, LengthFunction, format_length
 
 from .changes import Change, ChangeKind
 from .written import length_function, written_length

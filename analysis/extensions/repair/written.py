@@ -13,7 +13,6 @@ from ballplate.simulator.design import (
     Calibration,
     CoordinateCalibration,
     DistanceCalibration,
-    Indices,
     RadiusCalibration,
 )
 from ballplate.simulator.experiment import Experiment, Position, ReadingGroup
@@ -26,6 +25,7 @@ from ballplate.simulator.geometry import (
     plane_rotation,
 )
 from ballplate.simulator.inputs import (
+    Indices,
     LengthFunction,
     Step,
     format_path,

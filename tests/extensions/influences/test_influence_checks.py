@@ -15,8 +15,8 @@ from ballplate.simulator.design.influence_quantities import (
     Disturbed,
     Influence,
     InfluenceParameter,
-    InfluenceSettings,
 )
+from ballplate.simulator.experiment.influence_settings import InfluenceSettings
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.inputs.messages import ExperimentError
 

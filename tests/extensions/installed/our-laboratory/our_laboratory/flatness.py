@@ -7,7 +7,8 @@ from typing import ClassVar, Literal
 
 import numpy as np
 from ballplate import Design
-from ballplate.simulator.design import BallObservations, Calibration, References
+from ballplate.simulator.design import BallObservations, Calibration
+from ballplate.simulator.experiment import References
 from ballplate.simulator.geometry import BallLayout, Name
 from ballplate.simulator.inputs import Length, PositiveLength, Settings, Steps
 from ballplate.simulator.machines import Array, Integers

@@ -7,7 +7,8 @@ from typing import ClassVar, Literal
 
 import numpy as np
 from ballplate import Design, ErrorModel, Observations
-from ballplate.simulator.design import Calibration, References, Rows, State, shared_layout
+from ballplate.simulator.design import Calibration, Rows, State, shared_layout
+from ballplate.simulator.experiment import References
 from ballplate.simulator.geometry import BallLayout
 from ballplate.simulator.inputs import Length, PositiveLength, Settings, Steps
 from ballplate.simulator.machines import Array

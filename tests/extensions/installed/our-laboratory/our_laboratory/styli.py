@@ -7,12 +7,8 @@ from typing import Literal
 
 import numpy as np
 from ballplate import Influence
-from ballplate.simulator.design import (
-    DesignParts,
-    Disturbed,
-    InfluenceParameter,
-    InfluenceSettings,
-)
+from ballplate.simulator.design import DesignParts, Disturbed, InfluenceParameter
+from ballplate.simulator.experiment import InfluenceSettings
 from ballplate.simulator.inputs import Ratio
 from ballplate.simulator.machines import Array
 from pydantic import Field

@@ -11,6 +11,12 @@ from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
+from ballplate.simulator.design.observations.joint_values import MOST_JOINT_VALUES
+from ballplate.simulator.design.observations.whitening import (
+    CovarianceRoot,
+    IndefiniteError,
+    covariance_root,
+)
 from ballplate.simulator.inputs.extensions import optional_service
 from ballplate.simulator.inputs.messages import ExperimentError, Steps
 from ballplate.simulator.inputs.problems import Problems
@@ -20,9 +26,7 @@ from ballplate.simulator.inputs.yamltree import Mark
 from ballplate.simulator.machines.protocol import Array
 from pydantic import Field
 
-from ..lookup import References
-from .joint_values import MOST_JOINT_VALUES
-from .whitening import CovarianceRoot, IndefiniteError, covariance_root
+from .references import References
 
 # An uncertainty and the variance beside it agree to their last digits, this being a generous share.
 AGREE = 0.02

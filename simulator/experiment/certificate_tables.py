@@ -19,7 +19,7 @@ from ballplate.simulator.inputs.tables import (
 )
 from ballplate.simulator.machines.protocol import Array
 
-from ..lookup import References
+from .references import References
 
 STANDARD, EXPANDED, FACTOR = "standard_uncertainty", "expanded_uncertainty", "k"
 NO_FACTOR = "-"
