@@ -13,7 +13,7 @@ from ballplate.simulator.inputs.extensions import (
     provider,
     registered,
 )
-from ballplate.simulator.inputs.messages import UnusableError
+from ballplate.simulator.inputs.unusable import UnusableError
 
 # Modules of this package, in the order of the help.
 COMMANDS = {

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 from ballplate.simulator.computing.signals import ANSWERS
 from ballplate.simulator.inputs.extensions import fault_of, registered
-from ballplate.simulator.inputs.messages import UnusableError
+from ballplate.simulator.inputs.unusable import UnusableError
 
 from .commands import tell_of_extensions
 from .notes import told

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from ballplate.simulator.inputs.extensions import names, provider
-from ballplate.simulator.inputs.messages import UnusableError
+from ballplate.simulator.inputs.unusable import UnusableError
 
 from .commands import COMMANDS, GROUPS, command_of, commands_of_all, module_of, tell_of_extensions
 from .notes import add_telling

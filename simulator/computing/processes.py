@@ -20,7 +20,7 @@ from copy import deepcopy
 from functools import cache, wraps
 from typing import Any, ParamSpec, TypeVar
 
-from ballplate.simulator.inputs.own_code import OwnModules, own_modules
+from ballplate.simulator.inputs.module_finder import OwnModules, own_modules
 from threadpoolctl import ThreadpoolController
 
 from .signals import SAFE_PATH

@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any, ClassVar, Self, TypeVar, cast
 
 import numpy as np
-from ballplate.simulator.inputs.messages import UnusableError
 from ballplate.simulator.inputs.own_code import error_text, own_frame
+from ballplate.simulator.inputs.unusable import UnusableError
 from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers, Unit
 
 from .influence_quantities import DesignParts, Disturbed, Influence, InfluenceParameter

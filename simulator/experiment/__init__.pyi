@@ -7,6 +7,7 @@ from .bounds import (
     check_inside as check_inside,
     edge_of as edge_of,
     entered as entered,
+    length_of as length_of,
     limits_of as limits_of,
     occupied as occupied,
     shared as shared,
@@ -50,7 +51,7 @@ from .named_files import (
     runs_code as runs_code,
 )
 from .own_sections import check_installed as check_installed
-from .placements import check_turns as check_turns, resolve_position as resolve_position
+from .placements import check_turns as check_turns, resolve_positions as resolve_positions
 from .pool import placed_only as placed_only, with_chosen as with_chosen
 from .pool_sections import (
     GroupSettings as GroupSettings,
@@ -92,7 +93,7 @@ from .stated_values import (
     uncertainties_of as uncertainties_of,
     value_name as value_name,
 )
-from .structure import Sections as Sections
+from .validation import Sections as Sections
 from .variants import (
     is_same_place as is_same_place,
     node_at as node_at,

@@ -22,7 +22,7 @@ from ballplate.simulator.inputs.units import format_length
 from ballplate.simulator.inputs.yamltree import Mapping, Node, Sequence as SequenceNode, written
 
 from .references import References
-from .structure import Sections
+from .validation import Sections
 
 DEFAULT_PROBE = "probe"
 
@@ -44,7 +44,7 @@ def resolve_references(
     artefacts = {}
     layouts = {}
     balls = 0
-    for key, settings in sections.entries("artefacts").items():
+    for key, settings in sections.artefacts.items():
         name, steps = str(key), ("artefacts", str(key))
         listed = _with_coordinates(settings, folder, steps, problems, trust)
         if listed is None:

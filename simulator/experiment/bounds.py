@@ -8,12 +8,19 @@ from typing import Any
 
 import numpy as np
 from ballplate.simulator.design.objects import SLIGHTLY, Machine, Volume
-from ballplate.simulator.geometry.ball_layouts import BallLayout, frozen
+from ballplate.simulator.geometry.ball_layouts import BallLayout
 from ballplate.simulator.geometry.motions import AXIS_NAMES
-from ballplate.simulator.geometry.positions import AXIS_INDEX, Pose, ball_coordinates, corners
+from ballplate.simulator.geometry.positions import (
+    AXIS_INDEX,
+    Pose,
+    ball_coordinates,
+    balls_in_machine,
+    corners,
+)
 from ballplate.simulator.inputs.messages import Steps
 from ballplate.simulator.inputs.number_arrays import Array, Indices
 from ballplate.simulator.inputs.problems import Problems
+from ballplate.simulator.inputs.quantity_types import Place
 from ballplate.simulator.inputs.settings import hint, number_of
 from ballplate.simulator.inputs.units import format_length
 from ballplate.simulator.inputs.yamltree import Mark
@@ -21,7 +28,7 @@ from ballplate.simulator.inputs.yamltree import Mark
 from .model import Position, Probe
 from .pool_sections import LimitsSettings, Region
 from .references import References
-from .structure import Sections
+from .validation import Sections
 
 TOLERANCE = 1e-9
 
@@ -54,7 +61,7 @@ def resolve_bounds(
     """Return the limits that the volume, the probes and the limits of a pool state; None if one of
     them is invalid, which is reported.
     """
-    limits = sections.get("pool", "limits") or LimitsSettings.model_validate({})
+    limits = sections.pool.limits if sections.pool else LimitsSettings.model_validate({})
     reach = _reach(limits, references)
     forbidden = _forbidden(limits, references)
     if machine is None or machine.dimension != references.dimension:
@@ -66,6 +73,7 @@ def resolve_bounds(
 def limits_of(
     pose: Pose,
     layout: BallLayout,
+    balls: Array,
     edge: float | None,
     readings: Iterable[tuple[Indices, tuple[str, ...]]],
     bounds: Bounds,
@@ -74,10 +82,9 @@ def limits_of(
     that they read, and an `edge` of material stays inside the volume, by what is wrong beyond them;
     the least is above the greatest where there is no room.
 
-    `readings` are indices of balls, with the names of probes.
+    `balls` (n, d) are those of the pose; `readings` are indices of balls, with the names of probes.
     """
     ends = np.array([bounds.volume.lower, bounds.volume.upper])
-    balls = ball_coordinates(pose, layout)
     shifts: dict[str, list[Array]] = {OUTSIDE: []}
     if edge is not None:
         shifts[EDGE] = [ends - outline(pose, layout, edge)]
@@ -95,7 +102,20 @@ def limits_of(
 def shared(rooms: Iterable[Array]) -> Array:
     """Return what rooms (2, d) have in common."""
     least, greatest = np.swapaxes([*rooms], 0, 1)
-    return frozen([least.max(axis=0), greatest.min(axis=0)])
+    return np.array([least.max(axis=0), greatest.min(axis=0)])
+
+
+def length_of(place: Place, low: float, high: float) -> float:
+    """Return a place in metres; parts of a room between two ends, the middle if there is no room.
+
+    >>> length_of(0.75, 0.0, 0.5), length_of(RoomPart(0.3, "30 %"), -0.05, 0.95)
+    (0.75, 0.25)
+    """
+    if isinstance(place, float):
+        return place
+    fraction = place.fraction if low <= high else 0.5
+    # A millionth of a micrometre: as round as a length that one would write.
+    return float(round(low + fraction * (high - low), 12)) + 0.0
 
 
 def edge_of(artefact: str, bounds: Bounds, references: References) -> float | None:
@@ -166,7 +186,7 @@ def _through_walls(boxes: Array, volume: Volume) -> Array:
     """
     lower = np.where(boxes[:, 0] <= volume.lower + TOLERANCE, -np.inf, boxes[:, 0])
     upper = np.where(boxes[:, 1] >= volume.upper - TOLERANCE, np.inf, boxes[:, 1])
-    return frozen(np.stack([lower, upper], axis=1))
+    return np.stack([lower, upper], axis=1)
 
 
 def _ends(region: Region, steps: Steps, references: References) -> Array:
@@ -180,22 +200,35 @@ def _ends(region: Region, steps: Steps, references: References) -> Array:
         if k >= (references.dimension or 3):
             references.refuse_in_plane(*steps, axis)
         ends[:, k] = axis_lengths
-    return frozen(ends[:, : references.dimension or 3])
+    return ends[:, : references.dimension or 3]
 
 
 def check_inside(
-    position: Position,
-    steps: Steps,
+    positions: Mapping[Steps, Position],
     volume: Volume,
     probes: Mapping[str, Probe],
     references: References,
 ) -> None:
-    """Report readings with scale readings outside the measuring volume.
+    """Report positions, by their paths, with scale readings outside the measuring volume.
 
     Error models are functions of the scale readings, where the ball is less the probe's offset.
     Balls may be outside, and scale readings by a thousandth of the volume.
     """
-    layout = references.layouts[position.artefact]
+    layouts = [references.layouts[position.artefact] for position in positions.values()]
+    balls = balls_in_machine([position.pose for position in positions.values()], layouts)
+    for (steps, position), layout, places in zip(positions.items(), layouts, balls, strict=True):
+        if text := _outside(position, layout, places, volume, probes):
+            references.problems.add(steps, text)
+
+
+def _outside(
+    position: Position,
+    layout: BallLayout,
+    places: Array,
+    volume: Volume,
+    probes: Mapping[str, Probe],
+) -> str:
+    """Return what is wrong with scale readings of balls at `places` (n, d); possibly empty."""
     rows = [
         (group.ball_indices, probe, probes[probe].offset)
         for group in position.readings
@@ -203,15 +236,14 @@ def check_inside(
         if probe in probes and probes[probe].offset.shape == volume.lower.shape
     ]
     if not rows:
-        return
-    places = ball_coordinates(position.pose, layout)
+        return ""
     balls = np.concatenate([indices for indices, _, _ in rows])
     by_how_much, axes, sides = excess(
         np.concatenate([places[reading] - offset for reading, _, offset in rows]), volume
     )
     outside = np.flatnonzero(by_how_much > SLIGHTLY * (volume.upper - volume.lower)[axes])
     if len(outside) == 0:
-        return
+        return ""
     # The first of those furthest outside, whatever rounding makes of equal ones.
     worst = int(outside[np.argmax(by_how_much[outside] > by_how_much.max() - TOLERANCE)])
     axis, probe = int(axes[worst]), [probe for indices, probe, _ in rows for _ in indices][worst]
@@ -225,13 +257,12 @@ def check_inside(
     remedy = "move the artefact"
     if AXIS_NAMES[axis] in position.parts:
         remedy = f"there is no room along {AXIS_NAMES[axis]}: take a smaller artefact"
-    text = (
+    return (
         f'reading ball "{layout.names[balls[worst]]}" with probe "{probe}" moves the scales to'
         f" {AXIS_NAMES[axis]} = {format_length(place - offset)}{less},"
         f" {format_length(by_how_much[worst])} {sides[worst]} the measuring volume{others_text};"
         f" {remedy}, or read it otherwise"
     )
-    references.problems.add(steps, text)
 
 
 def excess(points: Array, volume: Volume) -> tuple[Array, Array, list[str]]:

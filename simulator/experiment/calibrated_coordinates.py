@@ -10,12 +10,12 @@ from ballplate.simulator.design.observations.calibration import (
     MOST_TIED_BALLS,
 )
 from ballplate.simulator.design.observations.coordinates import CoordinateCalibration, far_spread
-from ballplate.simulator.geometry.ball_layouts import BallLayout, BallNames, Name, frozen
+from ballplate.simulator.geometry.ball_layouts import BallLayout, BallNames, frozen
 from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.geometry.positions import Axis
 from ballplate.simulator.inputs.messages import Steps
 from ballplate.simulator.inputs.quantity_types import LengthUncertainty
-from ballplate.simulator.inputs.settings import Forms, Text, hint, listing
+from ballplate.simulator.inputs.settings import Forms, Name, Text, hint, listing
 from ballplate.simulator.machines.protocol import Array
 from numpy.typing import NDArray
 from pydantic import Field

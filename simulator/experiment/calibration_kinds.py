@@ -16,11 +16,10 @@ from ballplate.simulator.design.observations.calibration import (
 )
 from ballplate.simulator.design.observations.radius import RadiusCalibration
 from ballplate.simulator.geometry.artefacts import BryanGaugeSettings
-from ballplate.simulator.geometry.ball_layouts import Name
 from ballplate.simulator.inputs.extensions import provided
 from ballplate.simulator.inputs.messages import Steps
 from ballplate.simulator.inputs.quantity_types import LengthUncertainty, PositiveLength
-from ballplate.simulator.inputs.settings import Settings
+from ballplate.simulator.inputs.settings import Name, Settings
 from ballplate.simulator.inputs.validation import OpenKinds
 from pydantic import Field
 

@@ -10,19 +10,18 @@ from ballplate.simulator.design.observations.distances import DistanceCalibratio
 from ballplate.simulator.design.observations.radius import RadiusCalibration
 from ballplate.simulator.geometry.artefacts import BryanGaugeSettings, TwoSpheresSettings
 from ballplate.simulator.inputs.messages import Steps
-from ballplate.simulator.inputs.problems import Problems, written_text
+from ballplate.simulator.inputs.problems import Problems, written_texts
 from ballplate.simulator.inputs.settings import listing
 
 from .model import Position
 from .references import References
-from .structure import Sections
+from .validation import Sections
 
 
-def check_names(position_count: int, problems: Problems) -> None:
+def check_names(problems: Problems) -> None:
     """Report positions that have the same name."""
     first: dict[str, int] = {}
-    for i in range(position_count):
-        name = written_text(problems.root, "positions", i, "name")
+    for i, name in enumerate(written_texts(problems.root, "positions", "name")):
         if name is None:
             continue
         if name in first:
@@ -36,8 +35,7 @@ def check_names(position_count: int, problems: Problems) -> None:
 
 def check_use(
     sections: Sections,
-    positions: dict[int, Position],
-    position_count: int,
+    positions: Mapping[int, Position],
     references: References,
     candidates: Collection[Position] | None = (),
     planning: bool = False,
@@ -61,8 +59,8 @@ def check_use(
     if planning:
         placed |= in_pool
         uncertain |= set(references.artefact_names) if candidates is None else set()
-    for i in range(position_count):
-        name = written_text(problems.root, "positions", i, "artefact")
+    artefacts_written = written_texts(problems.root, "positions", "artefact")
+    for i, name in enumerate(artefacts_written):
         if name is None and len(references.artefact_names) == 1:
             name = references.artefact_names[0]
         # A position that cannot be understood may be one of any artefact, or read any ball of its
@@ -72,7 +70,7 @@ def check_use(
         if i not in positions:
             uncertain |= {str(name) for name in names}
     for name in references.artefact_names:
-        if not position_count and not readers:
+        if not artefacts_written and not readers:
             continue
         if name not in placed and name in in_pool:
             continue
@@ -86,7 +84,7 @@ def check_use(
             _check_balls_read(
                 name, [reader for reader in readers if reader.artefact == name], references
             )
-    calibration_count = len(sections.entries("calibration"))
+    calibration_count = len(sections.calibration)
     for name, settings in references.artefacts.items():
         with_one_length = isinstance(settings, TwoSpheresSettings | BryanGaugeSettings)
         if (
@@ -97,7 +95,7 @@ def check_use(
             kinds = (
                 [
                     calibration.kind
-                    for calibration in sections.entries("calibration").values()
+                    for calibration in sections.calibration.values()
                     if getattr(calibration, "artefact", "") in (name, None)
                 ]
                 if calibration_count
@@ -114,7 +112,7 @@ def check_use(
 def check_calibration_read(
     calibration: Calibration,
     steps: Steps,
-    positions: dict[int, Position],
+    positions: Mapping[int, Position],
     position_count: int,
     references: References,
 ) -> None:

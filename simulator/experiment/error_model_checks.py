@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from ballplate.simulator.design.objects import Machine
@@ -20,7 +21,7 @@ from ballplate.simulator.machines.truth import (
 )
 
 from .references import References
-from .structure import Sections
+from .validation import Sections
 
 _TRUE_MODEL = ("true_machine", "error_model")
 
@@ -32,10 +33,10 @@ def with_usable_error_model(
     stands in another file; faults go to the problems, also those of an error model for another
     number of dimensions than the volume has, or of a user's own.
     """
-    settings = sections.get("error_model")
+    settings = sections.error_model
     if settings is None or _check_model(settings, ("error_model",), machine, references):
         return sections
-    return sections.without("error_model")
+    return replace(sections, error_model=None)
 
 
 def _check_model(
@@ -75,7 +76,7 @@ def check_true_machine(sections: Sections, machine: Machine | None, references: 
     """Report a true machine whose own error model is wrong, or values that its error model cannot
     have.
     """
-    settings, truth = sections.get("error_model"), sections.get("true_machine")
+    settings, truth = sections.error_model, sections.true_machine
     if truth is None:
         return
     true_model = getattr(truth, "error_model", None)

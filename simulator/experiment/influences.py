@@ -20,14 +20,14 @@ from ballplate.simulator.design.influence_quantities import (
     wrong_of_shifts,
 )
 from ballplate.simulator.design.observations.priors import Priors
-from ballplate.simulator.experiment.influence_settings import InfluenceSettings
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.protocol import Integers
 
+from .influence_settings import InfluenceSettings
 from .model import Experiment, Position
 from .references import References
 from .size_checks import MOST_SHARED
-from .structure import Sections
+from .validation import Sections
 
 
 def resolve_influences(
@@ -41,7 +41,7 @@ def resolve_influences(
         for name in dict.fromkeys(placed.values())
         if references.artefacts[name].role != "plate"
     ]
-    for i, settings in sections.entries("influences").items():
+    for i, settings in sections.influences.items():
         steps = ("influences", i)
         text = (
             f'"{standards[0]}" is a length standard, and influence quantities are of plates only;'

@@ -1,4 +1,10 @@
-"""Loading of an experiment file: from YAML to experiments, or to all errors in it."""
+"""From the path of a file to its experiments, one for each variant, or to all errors in it.
+
+The file goes down four steps: `parse_tree` makes a tree of nodes of its text, `validate_sections`
+valid sections of the tree, `resolve` objects of these, whose names are looked up, and `construct`
+the experiment. Each returns what it makes and leaves what it got as it was; faults are collected in
+`Problems`, so that all are reported at once.
+"""
 
 from __future__ import annotations
 
@@ -9,12 +15,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from ballplate.simulator.inputs.decoding import refuse_long_lines
-from ballplate.simulator.inputs.extensions import service
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.inputs.own_code import OPENED, Trust
-from ballplate.simulator.inputs.problems import Problems, in_order, written_count
+from ballplate.simulator.inputs.problems import Problems, in_order
 from ballplate.simulator.inputs.yamltree import (
     Mapping,
     Mark,
@@ -22,30 +26,14 @@ from ballplate.simulator.inputs.yamltree import (
     mark_of,
     parse_tree,
     read_text,
-    written,
 )
-from ballplate.simulator.machines.settings import with_defaults
-from ballplate.simulator.machines.truth import with_model_defaults
 
-from .artefacts import resolve_references
-from .bounds import check_inside, resolve_bounds
-from .calibrations import resolve_calibration
 from .changes import node_of
-from .checks import check_calibration_read, check_names, check_radii, check_use
-from .error_model_checks import check_true_machine, with_usable_error_model
-from .influences import resolve_influences
-from .machine import resolve_evaluation, resolve_machine, resolve_noise, target_of
-from .model import Evaluation, Experiment, Position
-from .own_sections import needed_extensions, needed_service, resolve_own_sections
-from .placements import resolve_position
-from .pool import enabled_only, placed_only
-from .priors import resolve_priors
-from .probes import resolve_probes, resolve_stars
-from .readings_checks import check_readings
-from .readings_section import no_settings
-from .size_checks import check_size
+from .construction import construct, evaluable
+from .model import Experiment
+from .resolution import resolve
 from .spans import unspanned
-from .structure import validate_sections
+from .validation import validate_sections
 from .variants import MOST_OF_ALL, in_variants, variant_trees
 
 
@@ -176,125 +164,20 @@ def build(
     tolerant: bool = False,
 ) -> tuple[Experiment | None, list[Message]]:
     """Return the experiment of a tree without variants, or None, with its faults."""
+    problems = Problems(root)
+    builder = partial(_built, source=source, name=name, trust=trust, planning=planning)
     try:
-        return _build(root, source, name, trust, planning, tolerant)
+        sections = validate_sections(root, problems, planning)
+        resolved = resolve(sections, source.parent, problems, trust, planning)
     except ExperimentError as too_many:
         return None, list(too_many.messages)
-
-
-# In one piece: the order in which sections are resolved, each from those before it, stands in one
-# place.
-def _build(
-    root: Node, source: Path, name: str | None, trust: Trust, planning: bool, tolerant: bool
-) -> tuple[Experiment | None, list[Message]]:
-    problems = Problems(root)
-    sections = validate_sections(root, problems, planning)
-    references = resolve_references(sections, source.parent, problems, trust)
-    machine = (
-        resolve_machine(sections.get("machine"), problems) if sections.get("machine") else None
-    )
-    if machine is not None:
-        references = replace(references, volume=machine.volume)
-    probes = resolve_probes(sections, references)
-    bounds = resolve_bounds(sections, machine, probes, references)
-    sections = with_usable_error_model(sections, machine, references)
-    check_true_machine(sections, machine, references)
-    for section in ("positions", "calibration"):
-        for i in range(written_count(root, section)):
-            if sections.get(section, i) is None:
-                references.check_written((section, i))
-    position_count = written_count(root, "positions")
-    check_names(position_count, problems)
-    positions = {}
-    for key, settings in sections.entries("positions").items():
-        i = int(key)
-        position = resolve_position(settings, ("positions", i), bounds, references)
-        if position is not None:
-            positions[i] = position
-            volume = machine.volume if machine is not None and position.enabled else None
-            if volume is not None and len(volume.lower) == references.dimension:
-                check_inside(position, ("positions", i), volume, probes, references)
-    candidates = None
-    has_pool = written(root, "pool") is not None
-    if has_pool and (choose := needed_service("resolve_candidates", ("pool",), problems)):
-        candidates = choose(sections, positions, bounds, references)
-    is_complete = not has_pool if candidates is None else candidates.complete
-    choices: tuple[Position, ...] = () if candidates is None else candidates.positions
-    possible = choices if is_complete else None
-    check_use(sections, positions, position_count, references, possible, planning)
-    # What may read calibrated balls, and have priors; more than there is of it where some is wrong.
-    off = [position for position in positions.values() if not position.enabled]
-    enabled = {i: position for i, position in positions.items() if position.enabled}
-    offered = tuple(choices or enabled.values())
-    named = dict(enumerate((*offered, *off)))
-    readers, reader_count = enabled, position_count - len(off)
-    if planning:
-        readers = dict(enumerate(offered))
-        reader_count = len(readers) + (not is_complete)
-    calibrations = {}
-    for key, settings in sections.entries("calibration").items():
-        i = int(key)
-        calibration = resolve_calibration(settings, ("calibration", i), references)
-        if calibration is not None:
-            calibrations[i] = calibration
-            check_calibration_read(
-                calibration, ("calibration", i), readers, reader_count, references
-            )
-    check_radii(calibrations, problems)
-    pool = None
-    if candidates is not None:
-        pool = service("resolve_pool")(sections, candidates, calibrations, references)
-    priors = resolve_priors(sections, machine, named, probes, references)
-    influences = resolve_influences(sections, named, references)
-    noise = resolve_noise(sections.get("noise"), problems)
-    evaluation = resolve_evaluation(sections, machine, probes, references)
-    check_size(sections, machine, enabled, calibrations, probes, evaluation, references)
-    check_readings(sections, references)
-    stars = resolve_stars(sections, probes, references)
-    own_sections = resolve_own_sections(sections, references)
-    if problems.messages and not tolerant or machine is None:
-        return None, problems.messages
-    if evaluation is None:
-        evaluation = Evaluation(np.zeros((0, machine.dimension)), "")
-    error_model = sections.get("error_model")
-    experiment = Experiment(
-        title=sections.get("title"),
-        description=sections.get("description") or "",
-        name=name,
-        source=source,
-        machine=machine,
-        error_model=error_model and with_defaults(error_model, machine.dimension),
-        true_machine=with_model_defaults(sections.get("true_machine"), machine.dimension),
-        probes=probes,
-        artefacts=references.artefacts,
-        layouts=references.layouts,
-        positions=tuple(positions.values()),
-        calibration=tuple(calibrations.values()),
-        evaluation=evaluation,
-        target_uncertainty=target_of(sections),
-        sigma=sections.get("sigma"),
-        expected_rank_deficiency=sections.get("expected_rank_deficiency"),
-        seed=sections.get("seed"),
-        tree=root,
-        mark=mark_of(root, ("positions",), of_key=True),
-        builder=partial(_built, source=source, name=name, trust=trust, planning=planning),
-        coverage_factor=sections.get("coverage_factor"),
-        priors=priors,
-        influences=influences,
-        noise=noise,
-        trust=trust,
-        stars=stars,
-        pool=pool if planning else None,
-        doubts=tuple(str(doubt) for doubt in problems.doubts),
-        readings=sections.get("readings") or no_settings(),
-        notes=tuple(str(note) for note in problems.notes),
-        sections=own_sections,
-        extensions=needed_extensions(sections),
-    )
-    if tolerant and (problems.messages or off):
-        return experiment, problems.messages
-    experiment = enabled_only(experiment)
-    return experiment if planning or pool is None else placed_only(experiment), []
+    faults = problems.messages
+    if faults and not tolerant or resolved.machine is None:
+        return None, faults
+    experiment = construct(resolved, root, source, name, builder, planning)
+    if tolerant and (faults or not all(place.enabled for place in experiment.positions)):
+        return experiment, faults
+    return evaluable(experiment, resolved, planning), []
 
 
 def _without_variants(root: Node) -> Node:

@@ -4,7 +4,8 @@ tasks.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,7 @@ from .bounds import TOLERANCE, check_points
 from .model import Evaluation, Probe, Task
 from .references import References
 from .sections import MOST_POINTS, MachineSettings, PointsSettings, TaskSettings
-from .structure import Sections
+from .validation import Sections
 
 
 def check_ends(ends: Mapping[str, tuple[float, float]], steps: Steps, problems: Problems) -> bool:
@@ -111,15 +112,17 @@ def resolve_evaluation(
     references: References,
 ) -> Evaluation | None:
     """Return where to evaluate, or None after reporting faults."""
-    settings = sections.get("evaluation")
+    settings = sections.evaluation
     probe = references.probes[0] if references.probes else ""
-    nowhere = frozen(np.zeros((0, references.dimension or 0)))
+    nowhere = np.zeros((0, references.dimension or 0))
     if settings is None:
         return Evaluation(nowhere, probe)
     if settings.probe is not None:
         probe = settings.probe
         references.require(
-            probe in references.probes, ("evaluation", "probe"), _unknown(probe, references)
+            probe in references.probes,
+            ("evaluation", "probe"),
+            partial(_unknown, probe, references),
         )
     if settings.points is None and settings.tasks is None:
         text = (
@@ -128,8 +131,8 @@ def resolve_evaluation(
         references.problems.add(("evaluation",), text)
         return None
     tasks = [
-        _task(i, task, probe, machine, probes, sections, references)
-        for i, task in enumerate(settings.tasks or ())
+        _task(i, settings.tasks or (), probe, machine, probes, sections, references)
+        for i in range(len(settings.tasks or ()))
     ]
     points = nowhere if settings.points is None else _points(settings.points, machine, references)
     resolved = tuple(task for task in tasks if task is not None)
@@ -142,7 +145,7 @@ def resolve_evaluation(
 
 def _task(
     i: int,
-    settings: TaskSettings,
+    tasks: Sequence[TaskSettings],
     probe: str,
     machine: Machine | None,
     probes: Mapping[str, Probe],
@@ -153,7 +156,7 @@ def _task(
     steps = ("evaluation", "tasks", i)
     problems, dimension = references.problems, references.dimension
     before = len(problems.messages)
-    names = [task.name for task in sections.get("evaluation").tasks]
+    settings, names = tasks[i], [task.name for task in tasks]
     if settings.name in names[:i]:
         text = (
             f'"{settings.name}" is the name of tasks[{names.index(settings.name)}] already; names'
@@ -171,7 +174,7 @@ def _task(
         for k, name in enumerate(used):
             where = ("probe",) if settings.probes is None else ("probes", k)
             references.require(
-                name in references.probes, (*steps, *where), _unknown(name, references)
+                name in references.probes, (*steps, *where), partial(_unknown, name, references)
             )
     for key, point in (("from", settings.start), ("to", settings.to)):
         is_right = references.has_dimension(point, (*steps, key))
@@ -193,8 +196,8 @@ def target_of(sections: Sections, own_target: LengthFunction | None = None) -> T
     """Return the target of uncertainties: a length of its `own_target`, or else the file's, with
     its scope.
     """
-    target = own_target or sections.get("target_uncertainty")
-    return None if target is None else Target(target, sections.get("coverage_factor"))
+    target = own_target or sections.target_uncertainty
+    return None if target is None else Target(target, sections.coverage_factor)
 
 
 def _unknown(probe: str, references: References) -> str:

@@ -44,6 +44,9 @@ class Probe:
     standard_uncertainty: Array | None = None
     angles: tuple[float, float] | None = None
 
+    def __post_init__(self) -> None:
+        self.offset.setflags(write=False)
+
     @property
     def is_estimated(self) -> bool:
         """True if the offset is a parameter."""

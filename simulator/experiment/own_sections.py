@@ -17,20 +17,18 @@ from ballplate.simulator.inputs.messages import Steps
 from ballplate.simulator.inputs.problems import Problems
 
 from .references import References
-from .structure import KEYS, Sections
+from .validation import Sections
 
 
 def resolve_own_sections(sections: Sections, references: References) -> dict[str, Any]:
     """Return the entries under keys that extensions provide, converted by their `read` if they
     have one; faults go to the problems.
     """
-    check_installed(sections.get("extensions"), references.problems)
+    check_installed(sections.extensions, references.problems)
     resolved = {}
-    for steps, settings in sections.values.items():
-        key = str(steps[0])
-        if key not in KEYS:
-            reader = getattr(module_with("sections", key), "read", None)
-            resolved[key] = settings if reader is None else reader(settings, (key,), references)
+    for key, settings in sections.own.items():
+        reader = getattr(module_with("sections", key), "read", None)
+        resolved[key] = settings if reader is None else reader(settings, (key,), references)
     return resolved
 
 
@@ -45,14 +43,10 @@ def check_installed(names: Any, problems: Problems) -> None:
 
 def needed_extensions(sections: Sections) -> tuple[str, ...]:
     """Names of the extensions that a file states, or has kinds or keys of and are not shipped."""
-    classes = {type(part) for value in sections.values.values() for part in _parts(value)}
+    classes = {type(part) for part in sections.parts}
     used = {name for settings_class in classes if (name := owner(settings_class)) is not None}
     used -= {extension.name for extension in shipped()}
-    return tuple(dict.fromkeys((*(sections.get("extensions") or ()), *sorted(used))))
-
-
-def _parts(value: Any) -> tuple[Any, ...]:
-    return value if isinstance(value, tuple) else (value,)
+    return tuple(dict.fromkeys((*(sections.extensions or ()), *sorted(used))))
 
 
 def needed_service(name: str, steps: Steps, problems: Problems) -> Any | None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -13,12 +15,16 @@ from ballplate.simulator.geometry.positions import (
     FreePlacement,
     PlanePlacement,
     Pose,
-    nominal_pose,
+    balls_in_machine,
+    nominal_poses,
+    room_parts,
+    shifted,
 )
 from ballplate.simulator.inputs.messages import Steps
-from ballplate.simulator.inputs.quantity_types import Place, RoomPart, length_of
+from ballplate.simulator.inputs.number_arrays import Array
+from ballplate.simulator.inputs.quantity_types import Place
 
-from .bounds import Bounds, edge_of, limits_of, shared
+from .bounds import Bounds, edge_of, length_of, limits_of, shared
 from .model import Position, ReadingGroup
 from .position_sections import PositionSettings, ReadingSettings
 from .references import References, lengths_per_axis
@@ -30,45 +36,90 @@ PLANE_KEYS = ("plane", "level", "corner", "centre", "quarter_turns")
 READING_KEYS = ("probes", "balls", "repeats", "standard_uncertainty")
 
 
-def resolve_position(
-    settings: PositionSettings, steps: Steps, bounds: Bounds | None, references: References
-) -> Position | None:
-    """Return a position with its pose and readings, or None after reporting faults."""
+@dataclass(frozen=True)
+class _Draft:
+    """A position whose keys are right, before its pose is known."""
+
+    settings: PositionSettings
+    steps: Steps
+    artefact: str
+    layout: BallLayout
+    readings: tuple[ReadingGroup, ...]
+    placement: PlanePlacement | FreePlacement
+
+
+def resolve_positions(
+    entries: Mapping[Steps, PositionSettings], bounds: Bounds | None, references: References
+) -> dict[Steps, Position]:
+    """Return the positions that are right, by their paths, with poses and readings; faults go to
+    the problems.
+
+    A place that is a part of the free room is known once the artefact is placed at 0 along that
+    axis: the shifts at which its probes still reach all balls are the room.
+    """
+    d = references.dimension
+    drafts = [_draft(settings, steps, references) for steps, settings in entries.items()]
+    placed = [draft for draft in drafts if draft is not None]
+    if d is None or not placed:
+        return {}
+    poses = nominal_poses([(draft.placement, draft.layout) for draft in placed], d)
+    rooms, lengths = [np.zeros((2, d))] * len(placed), [dict[str, float]()] * len(placed)
+    if bounds is not None:
+        balls = balls_in_machine(poses, [draft.layout for draft in placed])
+        rooms = [
+            _room(draft, pose, places, bounds, references)
+            for draft, pose, places in zip(placed, poses, balls, strict=True)
+        ]
+        parts_of = room_parts([draft.placement for draft in placed])
+        lengths = [
+            {axis: length_of(part, *room[:, AXIS_INDEX[axis]]) for axis, part in parts.items()}
+            for parts, room in zip(parts_of, rooms, strict=True)
+        ]
+        shifts = [[parts.get(axis, 0.0) for axis in AXIS_INDEX][:d] for parts in lengths]
+        poses = shifted(poses, shifts)
+        rooms = [room - shift for room, shift in zip(rooms, shifts, strict=True)]
+    return {
+        draft.steps: Position(
+            draft.settings.name,
+            draft.artefact,
+            pose,
+            draft.readings,
+            draft.settings.description or "",
+            draft.settings.enabled,
+            room,
+            parts,
+        )
+        for draft, pose, room, parts in zip(placed, poses, rooms, lengths, strict=True)
+        if _is_read_as_it_lies(draft, pose, references)
+    }
+
+
+def _draft(settings: PositionSettings, steps: Steps, references: References) -> _Draft | None:
     artefact = references.artefact(settings.artefact, steps)
     layout = references.layouts.get(artefact) if artefact is not None else None
     readings = _readings(settings, steps, layout, references)
     placement = _placement(settings, steps, references)
-    if (
-        artefact is None
-        or layout is None
-        or readings is None
-        or placement is None
-        or references.dimension is None
-    ):
+    if artefact is None or layout is None or readings is None or placement is None:
         return None
-    pose = nominal_pose(placement, layout, references.dimension)
-    lengths, room = dict[str, float](), np.zeros((2, references.dimension))
-    if bounds is not None:
-        read = [(group.ball_indices, group.probes) for group in readings]
-        edge = edge_of(artefact, bounds, references)
-        room = shared(limits_of(pose, layout, edge, read, bounds).values())
-        lengths = {
-            axis: length_of(place, *room[:, AXIS_INDEX[axis]])
-            for axis, place in placement.places.items()
-            if isinstance(place, RoomPart)
-        }
-        by = [lengths.get(axis, 0.0) for axis in AXIS_INDEX][: references.dimension]
-        pose, room = Pose(pose.rotation, pose.origin + by), room - by
-    in_plane = references.artefacts[artefact].reads == "in plane"
+    return _Draft(settings, steps, artefact, layout, readings, placement)
+
+
+def _room(draft: _Draft, pose: Pose, balls: Array, bounds: Bounds, references: References) -> Array:
+    """Return the least and the greatest shifts (2, d) of a pose within its free room."""
+    read = [(group.ball_indices, group.probes) for group in draft.readings]
+    edge = edge_of(draft.artefact, bounds, references)
+    return shared(limits_of(pose, draft.layout, balls, edge, read, bounds).values())
+
+
+def _is_read_as_it_lies(draft: _Draft, pose: Pose, references: References) -> bool:
+    """True unless an artefact that is read in its plane is oblique, after saying so."""
+    in_plane = references.artefacts[draft.artefact].reads == "in plane"
     text = (
-        f'"{artefact}" is read in its plane, which has to be across an axis of the machine;'
+        f'"{draft.artefact}" is read in its plane, which has to be across an axis of the machine;'
         " correct the pose, or write reads: in space for the artefact"
     )
     is_across = float(np.abs(pose.rotation[:, -1]).max()) > 1.0 - OBLIQUE
-    if not references.require(is_across or not in_plane, (*steps, "pose"), text):
-        return None
-    words = settings.description or ""
-    return Position(settings.name, artefact, pose, readings, words, settings.enabled, room, lengths)
+    return references.require(is_across or not in_plane, (*draft.steps, "pose"), text)
 
 
 def _readings(

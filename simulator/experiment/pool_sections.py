@@ -5,10 +5,9 @@ from __future__ import annotations
 from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, Union
 
-from ballplate.simulator.geometry.ball_layouts import Name
 from ballplate.simulator.geometry.positions import Axis
 from ballplate.simulator.inputs.quantity_types import Duration, Length, Place, RoomPart
-from ballplate.simulator.inputs.settings import Forms, NonEmpty, Settings, Several, Text
+from ballplate.simulator.inputs.settings import Forms, Name, NonEmpty, Settings, Several, Text
 from ballplate.simulator.inputs.validation import OpenKinds
 from pydantic import Discriminator, Field, Tag, create_model, model_validator
 

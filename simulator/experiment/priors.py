@@ -20,7 +20,7 @@ from .model import Position, Prior, Probe
 from .own_sections import needed_service
 from .references import References
 from .sections import MapPriorSettings, PriorSettings
-from .structure import Sections
+from .validation import Sections
 
 MOST_PRIORS = 5000
 
@@ -33,7 +33,7 @@ def resolve_priors(
     references: References,
 ) -> tuple[Prior, ...]:
     """Return the priors; faults go to the problems."""
-    settings, entries = sections.get("error_model"), sections.entries("priors")
+    settings, entries = sections.error_model, sections.priors
     if not entries or settings is None or machine is None:
         return ()
     if machine.dimension not in kind_of(settings).dimensions:

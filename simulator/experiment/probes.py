@@ -20,7 +20,7 @@ from .artefacts import DEFAULT_PROBE
 from .model import Probe
 from .position_sections import HeadSettings, ProbeSettings, StarSettings
 from .references import References, lengths_per_axis
-from .structure import Sections
+from .validation import Sections
 
 # Stated offsets are nominal, and wrong by this much in metres before anybody need be told.
 NOMINAL = 3e-3
@@ -71,19 +71,19 @@ def resolve_probes(sections: Sections, references: References) -> dict[str, Prob
             )
             problems.add(("probes",), text)
             return {}
-        at_reference = Probe(DEFAULT_PROBE, frozen(np.zeros(dimension or 0)))
+        at_reference = Probe(DEFAULT_PROBE, np.zeros(dimension or 0))
         return {DEFAULT_PROBE: at_reference} if dimension == 2 else {}
-    tilts = [getattr(entry, "a", None) for entry in sections.entries("probes").values()]
-    if sections.get("head") is not None and set(tilts) <= {None}:
+    tilts = [getattr(entry, "a", None) for entry in sections.probes.values()]
+    if sections.head is not None and set(tilts) <= {None}:
         problems.doubt(("head",), "no probe states an angle A; the head has no effect")
     members = _star_members(sections, references)
     reference = _reference_probe(sections, references)
     probes = {}
-    for key, settings in sections.entries("probes").items():
+    for key, settings in sections.probes.items():
         name, steps = str(key), ("probes", str(key))
         offset, uncertainty, angles = settings, None, None
         if isinstance(settings, ProbeSettings):
-            offset = _offset(settings, sections.get("head"), steps, references)
+            offset = _offset(settings, sections.head, steps, references)
             angles = None if settings.a is None else (settings.a, settings.b or 0.0)
             uncertainty = _offset_uncertainty(settings, steps, references)
             if name in members and (settings.unknown or settings.standard_uncertainty):
@@ -91,10 +91,10 @@ def resolve_probes(sections: Sections, references: References) -> dict[str, Prob
                 text = "its star states the uncertainty of this probe; remove it"
                 problems.add((*steps, key), text, True)
         if name in members:
-            uncertainty = frozen([np.inf] * (dimension or 0))
+            uncertainty = np.full(dimension or 0, np.inf)
         if offset is not None and references.has_dimension(offset, steps):
             offset_uncertainty = None if name == reference else uncertainty
-            probes[name] = Probe(name, frozen(offset), offset_uncertainty, angles)
+            probes[name] = Probe(name, np.array(offset, float), offset_uncertainty, angles)
     return probes
 
 
@@ -125,7 +125,7 @@ def _offset(
 def _star_members(sections: Sections, references: References) -> list[str]:
     """Return probes of stars, and report faults of their names."""
     members = []
-    for i, settings in sections.entries("stars").items():
+    for i, settings in sections.stars.items():
         steps = ("stars", int(i), "probes")
         names = settings.probes or references.probes
         if settings.probes is not None and not references.are_probes(names, steps):
@@ -142,7 +142,7 @@ def _in_place(sections: Sections, references: References) -> list[str]:
     """Probes of stars that turn about the machine's reference point."""
     return [
         name
-        for settings in sections.entries("stars").values()
+        for settings in sections.stars.values()
         if settings.place == "stated"
         for name in settings.probes or references.probes
     ]
@@ -153,7 +153,7 @@ def resolve_stars(
 ) -> tuple[Star, ...]:
     """Return the stars that are right."""
     stars = []
-    for i, settings in sections.entries("stars").items():
+    for i, settings in sections.stars.items():
         names = tuple(settings.probes or references.probes)
         if not set(names) <= set(probes):
             continue
@@ -208,11 +208,7 @@ def _reference_probe(sections: Sections, references: References) -> str:
     that turn about a stated point need none.
     """
     problems = references.problems
-    listed = {
-        str(name): s
-        for name, s in sections.entries("probes").items()
-        if isinstance(s, ProbeSettings)
-    }
+    listed = {str(name): s for name, s in sections.probes.items() if isinstance(s, ProbeSettings)}
     named = [name for name, settings in listed.items() if settings.reference]
     for name in named[1:]:
         problems.add(

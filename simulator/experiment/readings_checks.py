@@ -12,14 +12,14 @@ from ballplate.simulator.inputs.units import LENGTH_UNITS, plain_unit
 from .own_sections import needed_service
 from .readings_section import ColumnsSettings, CompensationSettings, ReadingsSettings, check_rule
 from .references import References
-from .structure import Sections
+from .validation import Sections
 
 AXES = ("x", "y", "z")
 
 
 def check_readings(sections: Sections, references: References) -> None:
     """Report faults of the readings section beyond its form; read the file of a correction."""
-    settings, problems = sections.get("readings"), references.problems
+    settings, problems = sections.readings, references.problems
     if not isinstance(settings, ReadingsSettings):
         return
     if settings.unit is not None and plain_unit(settings.unit) not in LENGTH_UNITS:

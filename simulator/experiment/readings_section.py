@@ -7,8 +7,8 @@ from __future__ import annotations
 import re
 from typing import Annotated, Literal
 
-from ballplate.simulator.geometry.ball_layouts import Coordinates, Name
-from ballplate.simulator.inputs.settings import Forms, NonEmpty, Settings, Text, shorten
+from ballplate.simulator.geometry.ball_layouts import Coordinates
+from ballplate.simulator.inputs.settings import Forms, Name, NonEmpty, Settings, Text, shorten
 from ballplate.simulator.machines.protocol import TrueMachine
 from pydantic import Field, PrivateAttr
 

@@ -8,9 +8,9 @@ from typing import Annotated, Any, Literal, Self
 
 from ballplate.simulator.design.noise import Distribution, NoiseSettings
 from ballplate.simulator.geometry.artefacts import ARTEFACTS, AnyArtefactSettings
-from ballplate.simulator.geometry.ball_layouts import Coordinates, Name
+from ballplate.simulator.geometry.ball_layouts import Coordinates
 from ballplate.simulator.inputs.quantity_types import Day, Length, PositiveLength, TargetFunction
-from ballplate.simulator.inputs.settings import Forms, NonEmpty, Settings, Several, Text
+from ballplate.simulator.inputs.settings import Forms, Name, NonEmpty, Settings, Several, Text
 from ballplate.simulator.machines.settings import ErrorModelSettings
 from ballplate.simulator.machines.truth import TrueMachineSettings, ZeroSettings
 from pydantic import Discriminator, Field, StringConstraints, Tag, model_validator

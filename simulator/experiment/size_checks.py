@@ -18,7 +18,7 @@ from ballplate.simulator.machines.settings import (
 
 from .model import Evaluation, Position, Probe
 from .references import References
-from .structure import Sections
+from .validation import Sections
 
 # Parameters besides those of the balls: their time grows with the cube of the number, their memory
 # with its square.
@@ -42,7 +42,7 @@ def check_size(
     references: References,
 ) -> None:
     """Report what would take more memory than a computer usually has, or hours."""
-    problems, settings = references.problems, sections.get("error_model")
+    problems, settings = references.problems, sections.error_model
     if settings is None or machine is None or problems.has_below(("error_model",)):
         return
     d = machine.dimension

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Literal, Self, Union
 
 from ballplate.simulator.inputs.quantity_types import PositiveLength
+from ballplate.simulator.inputs.settings import Name
 from ballplate.simulator.inputs.validation import OpenKinds
 from pydantic import Discriminator, Field, Tag, model_validator
 
@@ -20,7 +21,6 @@ from .ball_layouts import (
     BallLayout,
     BallsPerSide,
     Coordinates,
-    Name,
     frozen,
 )
 

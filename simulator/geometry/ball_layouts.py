@@ -13,9 +13,9 @@ from typing import Annotated, Any, Literal, Self
 import numpy as np
 from ballplate.simulator.inputs.number_arrays import Array
 from ballplate.simulator.inputs.quantity_types import Length, PositiveLength
-from ballplate.simulator.inputs.settings import NonEmpty, Settings, listing, nearest, shorten
+from ballplate.simulator.inputs.settings import Name, NonEmpty, Settings, listing, nearest, shorten
 from numpy.typing import NDArray
-from pydantic import BeforeValidator, Field, StringConstraints, model_validator
+from pydantic import Field, model_validator
 
 MOST_BALLS = 40_000
 COINCIDENT = 1e-9
@@ -118,12 +118,6 @@ def coincident_balls(layout: BallLayout, at_most: int = 3) -> list[tuple[int, in
     return sorted(coincident)
 
 
-def _text_of_whole_number(value: object) -> object:
-    return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
-
-
-# Numbers are usual as names of balls, and YAML reads them as numbers.
-Name = Annotated[str, BeforeValidator(_text_of_whole_number), StringConstraints(min_length=1)]
 BallNames = NonEmpty[Name]
 Coordinates = Annotated[tuple[Length, ...], Field(min_length=2, max_length=3)]
 BallsPerSide = Annotated[int, Field(ge=2, le=500)]

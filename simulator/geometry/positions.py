@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -111,6 +111,33 @@ def nominal_pose(
     return Pose(rotation, lengths - anchor)
 
 
+def nominal_poses(
+    placed: Iterable[tuple[PlanePlacement | FreePlacement, BallLayout]], dimension: int
+) -> list[Pose]:
+    """Return the `nominal_pose` of each placement.
+
+    :raises ValueError: as `nominal_pose`.
+    """
+    return [nominal_pose(placement, layout, dimension) for placement, layout in placed]
+
+
+def room_parts(
+    placements: Iterable[PlanePlacement | FreePlacement],
+) -> list[dict[str, RoomPart]]:
+    """Return the places of each placement that are parts of the free room, by axis."""
+    return [
+        {axis: place for axis, place in placement.places.items() if isinstance(place, RoomPart)}
+        for placement in placements
+    ]
+
+
+def shifted(poses: Iterable[Pose], shifts: Iterable[Sequence[float]]) -> list[Pose]:
+    """Return poses shifted by (d,) metres each."""
+    return [
+        Pose(pose.rotation, pose.origin + shift) for pose, shift in zip(poses, shifts, strict=True)
+    ]
+
+
 def plane_rotation(plane: str, turns: int, dimension: int = 3) -> Array:
     """Return the rotation (d, d) of an artefact in a plane after quarter-turns."""
     turn = QUARTER_TURNS[turns % 4]
@@ -140,3 +167,8 @@ def corners(pose: Pose, layout: BallLayout, edge: float = 0.0) -> Array:
 def ball_coordinates(pose: Pose, layout: BallLayout) -> Array:
     """Return the nominal co-ordinates (n, d) of an artefact's balls in the machine, in metres."""
     return layout.coordinates[:, : len(pose.origin)] @ pose.rotation.T + pose.origin
+
+
+def balls_in_machine(poses: Iterable[Pose], layouts: Iterable[BallLayout]) -> list[Array]:
+    """Return the `ball_coordinates` of each pose and its layout."""
+    return [ball_coordinates(pose, layout) for pose, layout in zip(poses, layouts, strict=True)]

@@ -36,12 +36,12 @@ from .messages import (
     Message as Message,
     Step as Step,
     Steps as Steps,
-    UnusableError as UnusableError,
     format_path as format_path,
     in_lines as in_lines,
     in_one_line as in_one_line,
     refused as refused,
 )
+from .module_finder import own_modules as own_modules
 from .number_arrays import Array as Array, Flags as Flags, Indices as Indices, Integers as Integers
 from .own_code import (
     OPENED as OPENED,
@@ -51,7 +51,6 @@ from .own_code import (
     error_text as error_text,
     own_array as own_array,
     own_frame as own_frame,
-    own_modules as own_modules,
     own_result as own_result,
     running_own_code as running_own_code,
 )
@@ -98,7 +97,6 @@ from .quantity_types import (
     RoomPart as RoomPart,
     Temperature as Temperature,
     TemperatureDifference as TemperatureDifference,
-    length_of as length_of,
     parse_day as parse_day,
     place_text as place_text,
     stated_day as stated_day,
@@ -139,6 +137,7 @@ from .units import (
     plain_unit as plain_unit,
     typed_length as typed_length,
 )
+from .unusable import UnusableError as UnusableError
 from .validation import validated as validated
 from .yaml_writing import yaml_text as yaml_text
 from .yamltree import (

@@ -21,7 +21,7 @@ from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import TYPE_CHECKING, Any
 
-from .messages import UnusableError
+from .unusable import UnusableError
 
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
@@ -43,11 +43,11 @@ _KERNEL_TABLES = {
     "functions": ("", "__all__"),
     "schemas": ("cli.schema", "SCHEMAS"),
     "artefacts": ("simulator.geometry.artefacts", "ARTEFACTS"),
-    "calibrations": ("simulator.design.observations.kinds", "KINDS"),
+    "calibrations": ("simulator.experiment.calibration_kinds", "KINDS"),
     "error_models": ("simulator.machines.settings", "KINDS"),
-    "true_machines": ("simulator.machines.true_machine_settings", "KINDS"),
-    "sections": ("simulator.experiment.structure", "KEYS"),
-    "quantities": ("uncertainty.kernel_quantities", "KERNEL_QUANTITIES"),
+    "true_machines": ("simulator.machines.truth", "KINDS"),
+    "sections": ("simulator.experiment.validation", "KEYS"),
+    "quantities": ("uncertainty.quantities", "KERNEL_QUANTITIES"),
 }
 
 

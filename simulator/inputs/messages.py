@@ -8,14 +8,11 @@ from dataclasses import dataclass, field, replace
 
 Step = str | int
 Steps = tuple[Step, ...]
-
 # Errors reported of a file; more are repetitions of one error.
 MOST_MESSAGES = 1000
 MORE_ERRORS = f"more than {MOST_MESSAGES} errors; mend these first"
-
 # Messages that only differ in the line are told one by one if there are no more than these.
 FEW_ALIKE = 3
-
 # Characters that would break a line or reach the terminal as a command.
 # Beginning of a line that a workflow of GitHub takes as a command.
 COMMAND = re.compile(r"^(\s*)::")
@@ -126,7 +123,3 @@ def format_path(steps: Iterable[Step]) -> str:
         else:
             path += f"[{step}]"
     return path
-
-
-class UnusableError(Exception):
-    """An object cannot be used; the text has fact, reason and remedy."""

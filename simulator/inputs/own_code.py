@@ -1,7 +1,4 @@
-"""Code of the user's own: whether it is trusted, where its modules are found, and errors in it.
-
-On Python's path, these folders would also be searched by libraries for what is not installed.
-"""
+"""Code of the user's own: whether it is trusted, its calls, and the location of errors in it."""
 
 from __future__ import annotations
 
@@ -11,15 +8,15 @@ import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass
-from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
 
-from .messages import UnusableError, in_one_line, refused
+from .messages import in_one_line, refused
 from .number_arrays import Array
 from .settings import shorten
+from .unusable import UnusableError
 
 # Packages that are not the user's own.
 OTHERS = frozenset(
@@ -146,45 +143,3 @@ class Trust:
 
 # Of a file that the user opened by its name, and of one that came with another.
 OPENED, UNKNOWN = Trust(modules=True), Trust()
-
-
-@dataclass(frozen=True)
-class OwnModules:
-    """Finder of modules in `folders`: of those named by files, and of all that modules in `found`
-    import.
-    """
-
-    folders: list[str]
-    found: set[str]
-
-    def add(self, folder: str, name: str) -> None:
-        """Look for a module in a folder first."""
-        self.folders[:] = [folder, *(other for other in self.folders if other != folder)]
-        self.found.add(name.partition(".")[0])
-
-    def find_spec(self, name: str, path: object = None, _: object = None) -> ModuleSpec | None:
-        """Return the specification of a module, as `importlib` asks for it."""
-        if path is not None or not {name, _importer()} & self.found:
-            return None
-        spec = PathFinder.find_spec(name, self.folders)
-        if spec is not None:
-            self.found.add(name)
-        return spec
-
-
-def _importer() -> object:
-    """Return the package of the code that imports."""
-    frame = sys._getframe(2)
-    while (name := frame.f_globals["__name__"].partition(".")[0]) == "importlib":
-        assert frame.f_back is not None
-        frame = frame.f_back
-    return name
-
-
-def own_modules() -> OwnModules:
-    """Return the finder of this process."""
-    for finder in sys.meta_path:
-        if isinstance(finder, OwnModules):
-            return finder
-    sys.meta_path.append(made := OwnModules([], set()))
-    return made

@@ -99,6 +99,11 @@ def written_count(root: Node, *steps: Step) -> int:
     return len(node.items) if isinstance(node, Sequence) else 0
 
 
+def written_texts(root: Node, section: str, key: str) -> list[str | None]:
+    """Return the names under a key as written, of all entries of a list, valid or not."""
+    return [written_text(root, section, i, key) for i in range(written_count(root, section))]
+
+
 def written_text(root: Node, *steps: Step) -> str | None:
     """Return a name as written at a path, or None."""
     node = written(root, *steps)

@@ -126,19 +126,6 @@ class RoomPart:
     written: str
 
 
-def length_of(place: Place, low: float, high: float) -> float:
-    """Return a place in metres; parts of a room between two ends, the middle if there is no room.
-
-    >>> length_of(0.75, 0.0, 0.5), length_of(RoomPart(0.3, "30 %"), -0.05, 0.95)
-    (0.75, 0.25)
-    """
-    if isinstance(place, float):
-        return place
-    fraction = place.fraction if low <= high else 0.5
-    # A millionth of a micrometre: as round as a length that one would write.
-    return float(round(low + fraction * (high - low), 12)) + 0.0
-
-
 def parse_place(value: object) -> float | RoomPart:
     """Read a length and return it in metres, or a part of the free room.
 

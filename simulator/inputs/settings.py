@@ -6,7 +6,15 @@ import difflib
 from collections.abc import Iterable
 from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Discriminator, Field, StringConstraints, Tag
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    StringConstraints,
+    Tag,
+)
 
 
 def _form(value: Any) -> str:
@@ -44,6 +52,17 @@ message states the expected form.
 """
 
 Text = Annotated[str, StringConstraints(min_length=1)]
+
+# What is unknown may be an extension's.
+LACKING = "if an extension provides it, install that"
+
+
+def _text_of_whole_number(value: object) -> object:
+    return str(value) if isinstance(value, int) and not isinstance(value, bool) else value
+
+
+# Numbers are usual as names of balls, and YAML reads them as numbers.
+Name = Annotated[str, BeforeValidator(_text_of_whole_number), StringConstraints(min_length=1)]
 
 
 class Settings(BaseModel):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
@@ -12,10 +12,10 @@ from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, TypeAdap
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from .extensions import MissingExtensionError, names, provided, provider
-from .messages import Steps, UnusableError
+from .messages import Steps
 from .problems import Problems
 from .settings import Settings
-from .wording import explain
+from .unusable import UnusableError
 from .yamltree import Node, to_python
 
 T = TypeVar("T")
@@ -32,6 +32,24 @@ def validated(kind: type[T], root: Node, problems: Problems) -> T | None:
         return None
 
 
+def validated_parts(
+    parts: Iterable[tuple[Steps, Any, Node]], problems: Problems
+) -> dict[Steps, Any]:
+    """Return the valid values of parts of a tree, each a path, a type and a node; faults go to the
+    problems.
+    """
+    values = {}
+    for steps, kind, node in parts:
+        adapter = type_adapter(kind)
+        try:
+            values[steps] = adapter.validate_python(to_python(node))
+        except ValidationError as error:
+            explain_in(problems, error, adapter, node, steps)
+        except MissingExtensionError as error:
+            problems.add(steps, str(error))
+    return values
+
+
 def explain_in(
     problems: Problems,
     error: ValidationError,
@@ -40,6 +58,9 @@ def explain_in(
     steps: Steps = (),
 ) -> None:
     """Add messages about a node at a path."""
+    # Most files are right, and wording is the largest module of this room.
+    from .wording import explain
+
     for explanation in explain(error.errors(include_url=False), node, _schema(adapter)):
         problems.add((*steps, *explanation.steps), explanation.text, explanation.of_key)
 

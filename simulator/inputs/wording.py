@@ -11,15 +11,13 @@ from pydantic_core import ErrorDetails
 
 from .messages import MOST_MESSAGES, Steps
 from .problems import written_keys
-from .settings import describe, hint, listing, shorten
+from .settings import LACKING, describe, hint, listing, shorten
 from .yamltree import Mapping, Node, Scalar, Sequence, child, to_python, written
 
 Schema = AnyMapping[str, Any]
 
 # Keys that may state an expanded uncertainty in place of a standard one.
 NOT_STANDARD = ("expanded_uncertainty", "uncertainty", "expanded", "u", "u95", "accuracy")
-# Remedy for an unknown kind or key that an extension may provide.
-LACKING = "if an extension provides it, install that"
 # Kinds by their synonyms, in lower case, letters only.
 OTHER_NAMES = {
     **dict.fromkeys(("ballbar", "barbell", "dumbbell"), "two_spheres"),

@@ -228,7 +228,7 @@ READERS = {
     "analysis/extensions/influences/sag.py",
     "simulator/experiment/probes.py",  # star
     "simulator/experiment/machine.py",  # points
-    "simulator/experiment/references.py",  # balls
+    "simulator/experiment/artefacts.py",  # balls
     "analysis/extensions/machine_files/curve_files.py",  # exx, eyx
     "simulator/inputs/covariances.py",
     "simulator/readings/reading_sources.py",
@@ -239,8 +239,8 @@ READERS = {
     "analysis/extensions/reproduction/published.py",  # a table of the project's own
 }
 
-# What makes their names known, and what writes tables.
-WRITERS = {"simulator/inputs/__init__.py", "simulator/inputs/decoding.py"}
+# What writes tables.
+WRITERS = {"simulator/inputs/decoding.py"}
 
 
 def test_no_other_place_reads_a_table() -> None:

@@ -23,6 +23,7 @@ from ballplate.simulator.experiment import (
     check_turns,
     edge_of,
     entered,
+    length_of,
     lengths_per_axis,
     limits_of,
     occupied,
@@ -35,6 +36,7 @@ from ballplate.simulator.geometry import (
     BallLayout,
     PlanePlacement,
     Pose,
+    ball_coordinates,
     nominal_pose,
 )
 from ballplate.simulator.inputs import (
@@ -42,7 +44,6 @@ from ballplate.simulator.inputs import (
     Place,
     RoomPart,
     Steps,
-    length_of,
     length_text,
     place_text,
     to_python,
@@ -135,7 +136,8 @@ def _rows(
     )
     edge = edge_of(group.artefact, bounds, references)
     read = [(readings.ball_indices, readings.probes)]
-    limits = limits_of(at_zero, group.layout, edge, read, bounds)
+    balls = ball_coordinates(at_zero, group.layout)
+    limits = limits_of(at_zero, group.layout, balls, edge, read, bounds)
     room = shared(limits.values())
     points = np.array(
         [

@@ -38,9 +38,9 @@ from ballplate.simulator.experiment import (
     limits_of,
     occupied,
     resolve_calibration,
-    resolve_position,
+    resolve_positions,
 )
-from ballplate.simulator.geometry import AXIS_INDEX
+from ballplate.simulator.geometry import AXIS_INDEX, ball_coordinates
 from ballplate.simulator.inputs import (
     Array,
     Mapping,
@@ -118,7 +118,8 @@ def resolve_candidates(
     problems = references.problems
     root, result = problems.root, Candidates()
     node = written(root, "pool")
-    if ("pool", "times") not in sections.values:
+    pool = sections.pool
+    if pool is None:
         result.complete = node is None
         return result
     # The candidates have a limit of their own.
@@ -127,7 +128,7 @@ def resolve_candidates(
     is_known = isinstance(node, Mapping) and set(node.items) <= set(PoolSettings.model_fields)
     is_list = isinstance(written(root, "pool", "candidates"), Sequence | None)
     names_differ = _check_names(references)
-    times: TimesSettings = sections.get("pool", "times")
+    times = pool.times
     if bounds is not None:
         result.forbidden = bounds.forbidden
     all_drawn = len(positions) == written_count(root, "positions")
@@ -135,13 +136,11 @@ def resolve_candidates(
     for i, position in positions.items():
         if not position.enabled:
             continue
-        settings = sections.get("positions", i)
+        plane = sections.positions[i].plane
         item_settings = to_python(written(root, "positions", i))  # type: ignore[arg-type]
         own_times = (times.positions or {}).get(position.name)
         result.add(
-            _candidate(
-                position, settings.plane, "", True, item_settings, times, own_times, references
-            )
+            _candidate(position, plane, "", True, item_settings, times, own_times, references)
         )
         references.count_readings(result.found[-1].readings, ("positions", i))
         if bounds is not None:
@@ -155,14 +154,14 @@ def resolve_candidates(
     count = len(positions)
     for i in range(written_count(root, "pool", "candidates")):
         steps = ("pool", "candidates", i)
-        settings = sections.get(*steps)
+        settings = pool.candidates.get(i)
         if settings is None:
             references.check_written(steps)
             result.complete = False
             count += 1
         elif isinstance(settings, ListedSettings):
             count += 1
-            listed = resolve_position(settings, steps, bounds, references)
+            listed = resolve_positions({steps: settings}, bounds, references).get(steps)
             if listed is None:
                 result.complete = False
                 continue
@@ -174,7 +173,7 @@ def resolve_candidates(
                     result.drop(FORBIDDEN)
                     continue
                 before = len(problems.messages)
-                check_inside(listed, steps, bounds.volume, bounds.probes, references)
+                check_inside({steps: listed}, bounds.volume, bounds.probes, references)
                 if len(problems.messages) == before:
                     _check_bounds(listed, steps, bounds, references)
             item_settings = to_python(written(root, *steps))  # type: ignore[arg-type]
@@ -236,7 +235,7 @@ def resolve_pool(
     """Return the pool, if there is one; faults go to the problems."""
     problems = references.problems
     root = problems.root
-    if ("pool", "times") not in sections.values:
+    if sections.pool is None:
         return None
     chosen_from, complete = list(candidates.found), candidates.complete
     at_most = []
@@ -251,10 +250,12 @@ def resolve_pool(
     }
     for i in range(written_count(root, "pool", "calibration")):
         steps: Steps = ("pool", "calibration", i)
-        settings = sections.get(*steps)
+        settings = sections.pool.calibration.get(i)
         if settings is None:
             references.check_written(steps)
-        item = resolve_calibration(settings, steps, references) if settings is not None else None
+            complete = False
+            continue
+        item = resolve_calibration(settings, steps, references)
         if item is None:
             complete = False
             continue
@@ -278,9 +279,8 @@ def resolve_pool(
     if complete:
         check_lengths(by_steps, candidates.positions, references)
     at_most += [AtMost(tuple(members), 1) for members in radii.values() if len(members) > 1]
-    limits: LimitsSettings = sections.get("pool", "limits")
+    limits, times = sections.pool.limits, sections.pool.times
     must, limited = _limits(limits, chosen_from, complete, references)
-    times: TimesSettings = sections.get("pool", "times")
     changes = ChangeTimes(
         _or(times.probe_change, PROBE_CHANGE), _or(times.plane_change, PLANE_CHANGE)
     )
@@ -394,7 +394,9 @@ def _check_bounds(position: Position, steps: Steps, bounds: Bounds, references: 
     edge = edge_of(position.artefact, bounds, references)
     read = [(group.ball_indices, group.probes) for group in position.readings]
     layout = references.layouts[position.artefact]
-    for reason, (least, greatest) in limits_of(position.pose, layout, edge, read, bounds).items():
+    balls = ball_coordinates(position.pose, layout)
+    limits = limits_of(position.pose, layout, balls, edge, read, bounds)
+    for reason, (least, greatest) in limits.items():
         by_axis = np.maximum(least, -greatest)
         beyond, axis = float(by_axis.max()), list(AXIS_INDEX)[by_axis.argmax()]
         if reason == OUTSIDE or beyond <= TOLERANCE:
