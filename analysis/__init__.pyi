@@ -68,8 +68,8 @@ from .simulator.inputs.extensions import (
     MissingExtensionError as MissingExtensionError,
 )
 from .simulator.inputs.messages import ExperimentError as ExperimentError, Message as Message
-from .simulator.inputs.own_code import Trust as Trust
 from .simulator.inputs.quantities import Target as Target, parse_length as parse_length
+from .simulator.inputs.trust import Trust as Trust
 from .simulator.machines.protocol import ErrorModel as ErrorModel
 from .uncertainty.quantities import QUANTITIES as QUANTITIES, QuantityKind as QuantityKind
 

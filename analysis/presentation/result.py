@@ -12,12 +12,13 @@ from ballplate.simulator.inputs.settings import number_of
 
 from .files import write_file
 from .formatting import Data, as_data, as_html, as_latex, as_markdown
-from .table_columns import MainTable, table_rows
 
 if TYPE_CHECKING:
     import pandas
     from ballplate.simulator.readings.observed_readings import ObservedReadings
     from matplotlib.figure import Figure
+
+    from .table_columns import MainTable
 
 # Rows of a table in a notebook.
 MOST_ROWS_SHOWN = 60
@@ -74,6 +75,8 @@ class Result:
         """The rows of its main table in metres, radians and ratios, by the names of the columns;
         units have a separate column.
         """
+        from .table_columns import table_rows
+
         columns = self.columns()
         if columns is None:
             raise NotImplementedError
@@ -87,6 +90,8 @@ class Result:
 
     def _shown_rows(self) -> list[Data]:
         """The rows in the units of text."""
+        from .table_columns import table_rows
+
         columns = self.columns()
         return self.rows() if columns is None else table_rows(*columns, in_units=True)
 

@@ -17,7 +17,6 @@ from ballplate.simulator.geometry.motions import without_rigid_motion
 from ballplate.simulator.inputs.quantities import Target
 from ballplate.simulator.machines.protocol import Array
 
-from .descriptions import described, largest_displacement, signed
 from .directions import Direction, elementary_mixture, principal_directions
 
 # Limit of the gap: a greater one separates determined directions from rounding.
@@ -105,6 +104,10 @@ def relative_changes(design: Design, layout: SharedLayout, directions: Array) ->
 
 def null_directions(at: Linearisation) -> tuple[Direction, ...]:
     """Return the undetermined directions, in a basis in which each involves few parameters."""
+    if not at.deficiency:
+        return ()
+    from .descriptions import described
+
     return tuple(described(at.design, at.layout, *change) for change in null_changes(at))
 
 
@@ -112,6 +115,10 @@ def null_changes(at: Linearisation) -> list[tuple[Array, Array]]:
     """Return each undetermined direction as reported: changes (s,) of the shared parameters and (n,
     d) of the balls, at most one micrometre.
     """
+    if not at.deficiency:
+        return []
+    from .descriptions import largest_displacement, signed
+
     changes = []
     for mixture in independent_mixture(at).T:
         shared, balls = at.shared_null @ mixture, at.ball_null @ mixture
@@ -124,6 +131,8 @@ def weak_changes(at: Linearisation, target: Target | None = None) -> list[Array]
     """Return each weak direction as reported, weakest first: changes (s,) of the shared parameters,
     one standard deviation long.
     """
+    from .descriptions import signed
+
     still = np.zeros_like(at.design.balls.places)
     return [signed(at.design, at.layout, root, still)[0] for root in _weak_roots(at, target)[0].T]
 
@@ -184,6 +193,8 @@ def _weak_directions(
 ) -> tuple[Direction, ...]:
     if not roots.shape[1]:
         return ()
+    from .descriptions import described, signed
+
     directions = []
     of_points = np.sqrt(2.0 * (relative_changes(design, layout, roots) ** 2).mean(axis=1))
     beyond = above(of_points, limit).sum(axis=0)

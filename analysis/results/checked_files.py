@@ -20,8 +20,8 @@ from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.experiment.variants import unknown_variants
 from ballplate.simulator.inputs.extensions import service
 from ballplate.simulator.inputs.messages import ExperimentError, Message
-from ballplate.simulator.inputs.own_code import OPENED, Trust
 from ballplate.simulator.inputs.settings import number_of
+from ballplate.simulator.inputs.trust import OPENED, Trust
 from ballplate.simulator.inputs.yamltree import Mark
 from ballplate.uncertainty.pairs import TaskUncertainty
 from ballplate.uncertainty.summaries import Quantity, tasks_of, uncertainties

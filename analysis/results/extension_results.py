@@ -13,12 +13,12 @@ from ballplate.simulator.inputs.extensions import MissingExtensionError, service
 from ballplate.simulator.inputs.yamltree import Mark
 from ballplate.simulator.machines.protocol import Array
 
-from .lack_of_fit import LackOfFit
-
 if TYPE_CHECKING:
     from ballplate.simulator.estimation.gauss_newton import Solution
     from ballplate.simulator.experiment.earlier_campaigns import EarlierCampaign
     from ballplate.simulator.readings.observed_readings import ObservedReadings
+
+    from .lack_of_fit import LackOfFit
 
 
 class AskedResult(Protocol):
@@ -125,6 +125,8 @@ def lack_of_fit(
     squares: float, freedom: int, diagnosis: Suspicion | None, untested: str
 ) -> LackOfFit:
     """Return the lack of fit of a sum of squares; `untested` residuals may have a pattern."""
+    from .lack_of_fit import LackOfFit
+
     if not diagnosis:
         return LackOfFit(squares, freedom, 0, bool(untested))
     contradicted = tuple(

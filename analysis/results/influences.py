@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from ballplate.presentation.formatting import Data
-from ballplate.presentation.table_columns import table_lines
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.machines.protocol import Unit
 
@@ -52,6 +51,8 @@ COLUMNS: dict[str, Any] = {
 
 def influence_table(influences: Sequence[InfluenceUncertainty]) -> list[str]:
     """Return up to `MOST_LINES` rows as lines of text."""
+    from ballplate.presentation.table_columns import table_lines
+
     omitted = len(influences) - MOST_LINES
     more = [f"({omitted} more are in --json)"] if omitted > 0 else []
     return [*table_lines(COLUMNS, influences[:MOST_LINES]), *more]

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from ballplate.presentation.formatting import Data, given
 from ballplate.presentation.result import Result
-from ballplate.presentation.table_columns import MainTable
 from ballplate.rank.verdicts import Verdict
 from ballplate.simulator.computing.processes import single_threaded
 from ballplate.simulator.design.arrays import Design
@@ -23,7 +22,6 @@ from ballplate.uncertainty.scale import Scale, scale_of
 from ballplate.uncertainty.summaries import Quantity, tasks_of
 
 from .extension_results import PredictedAssumptions
-from .influences import InfluenceUncertainty, influence_data, influence_table
 from .qualifications import (
     Qualification,
     given_words,
@@ -48,8 +46,11 @@ from .text_blocks import (
 if TYPE_CHECKING:
     import pandas
     from ballplate.montecarlo.experiments import Trials
+    from ballplate.presentation.table_columns import MainTable
     from ballplate.simulator.experiment.model import Experiment
     from matplotlib.figure import Figure
+
+    from .influences import InfluenceUncertainty
 
 
 @dataclass(frozen=True)
@@ -145,6 +146,8 @@ class Prediction(Result):
 
     def table_lines(self) -> list[str]:
         """Title, verdict and table, without replicates."""
+        from .influences import influence_table
+
         rank, *further = verdict_lines(self.verdict, lengths=self.lengths)
         qualified = self.qualified
         lines = [self.heading, rank, *further]
@@ -158,6 +161,8 @@ class Prediction(Result):
         return lines if self.assumptions is None else [*lines, "", *self.assumptions.summary()]
 
     def data(self) -> Data:
+        from .influences import influence_data
+
         data = {
             **self.named,
             **verdict_data(self.verdict),

@@ -17,7 +17,6 @@ from ballplate.presentation.formatting import (
     shown_unit,
     uncertainty_words,
 )
-from ballplate.presentation.table_columns import table_lines
 from ballplate.rank.verdicts import GREAT, Verdict
 from ballplate.simulator.computing.numerics import printable
 from ballplate.simulator.inputs.settings import listing, number_of
@@ -26,12 +25,12 @@ from ballplate.uncertainty.pairs import TaskUncertainty, is_determined
 from ballplate.uncertainty.scale import Scale
 from ballplate.uncertainty.summaries import Quantity
 
-from .adjustments import ARCSECOND, Adjustment
-from .plates import PlateCoordinates
-
 if TYPE_CHECKING:
     from ballplate.simulator.estimation.gauss_newton import Iteration
     from ballplate.simulator.experiment.model import Experiment
+
+    from .adjustments import Adjustment
+    from .plates import PlateCoordinates
 
 # Format of sums of squares.
 FIVE = "{:.5e}".format
@@ -58,6 +57,8 @@ QUANTITY_COLUMNS: dict[str, Any] = {
 
 def uncertainty_table(quantities: dict[str, Quantity], caveat: str = "") -> list[str]:
     """Return U1 to U6 as lines of text; a `caveat` follows shares within the target."""
+    from ballplate.presentation.table_columns import table_lines
+
     shown = {symbol: row for symbol, row in quantities.items() if ", " not in row.unit}
     names = [symbol.partition(" ")[0] for symbol in shown]
     firsts = ["" if name in names[:k] else name for k, name in enumerate(names)]
@@ -87,6 +88,8 @@ def uncertainty_table(quantities: dict[str, Quantity], caveat: str = "") -> list
 
 def task_table(tasks: Sequence[TaskUncertainty], caveat: str = "") -> list[str]:
     """Return measuring tasks as lines of text; a `caveat` follows the target's uncertainty."""
+    from ballplate.presentation.table_columns import table_lines
+
     columns = {
         "task": "name",
         "length, mm": ("length", 6),
@@ -161,6 +164,8 @@ def verdict_lines(
 
 def iteration_lines(record: Sequence[Iteration], shown: Callable[[float], str] = FIVE) -> list[str]:
     """Return the record of iterations as lines of text, with steps as `shown`."""
+    from ballplate.presentation.table_columns import table_lines
+
     columns = {
         "iteration": range(len(record)),
         "step": ([None, *(iteration.step for iteration in record[1:])], shown),
@@ -297,6 +302,8 @@ def _border(judged: Verdict) -> str:
 
 def plate_table(plate: PlateCoordinates, named: bool) -> list[str]:
     """Return a plate's co-ordinates in its own axes as lines of text, of up to `MOST_BALLS`."""
+    from ballplate.presentation.table_columns import table_lines
+
     title = "co-ordinates of the balls in the plate's own axes"
     lines = [f"{plate.artefact + ': ' if named else ''}{title} ({plate.words})"]
     (x, y), (u, v) = (
@@ -315,8 +322,13 @@ def plate_table(plate: PlateCoordinates, named: bool) -> list[str]:
 
 
 def _turned(name: str) -> Callable[[Adjustment], float]:
-    # Mechanics read arcseconds and µm/m.
-    return lambda row: float(getattr(row, name) / (ARCSECOND if row.unit == "rad" else 1e-6))
+    def in_practice(row: Adjustment) -> float:
+        from .adjustments import ARCSECOND
+
+        # Mechanics read arcseconds and µm/m.
+        return float(getattr(row, name) / (ARCSECOND if row.unit == "rad" else 1e-6))
+
+    return in_practice
 
 
 ADJUSTMENT_COLUMNS: dict[str, Any] = {
@@ -331,6 +343,8 @@ ADJUSTMENT_COLUMNS: dict[str, Any] = {
 
 def adjustment_lines(adjustments: Sequence[Adjustment]) -> list[str]:
     """Return adjustments as a table of text."""
+    from ballplate.presentation.table_columns import table_lines
+
     return [
         *table_lines(ADJUSTMENT_COLUMNS, adjustments),
         "(errors of scales: true length less reading; errors of angles: excess over 90 deg)",

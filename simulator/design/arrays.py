@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any, ClassVar, Self, TypeVar, cast
 
 import numpy as np
-from ballplate.simulator.inputs.own_code import error_text, own_frame
 from ballplate.simulator.inputs.unusable import UnusableError
 from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers, Unit
 
@@ -312,6 +311,8 @@ def influence_shifts(
         except MemoryError:
             raise
         except Exception as error:
+            from ballplate.simulator.inputs.own_code import error_text, own_frame
+
             frames = traceback.extract_tb(error.__traceback__)
             user_frame = own_frame(error) or next(
                 (f for f in frames[::-1] if f.name == "shifts"), None

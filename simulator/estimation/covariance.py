@@ -17,7 +17,6 @@ from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.machines.protocol import Array, Integers
 
 from .elimination import Factor
-from .graded import triangle
 
 
 def solve_balls(factor: Factor, side: Array, transposed: bool = False) -> Array:
@@ -220,6 +219,8 @@ def _determined(factor: Factor, scale: Array, spanned: Array) -> tuple[Array, Ar
     """Singular values (r,) and directions (s, r) of a scaled factor within what `spanned` (s, r)
     spans.
     """
+    from .graded import triangle
+
     if factor.orders is None:
         _, values, right = svd((factor.root * scale) @ spanned, full_matrices=False)
         return values, spanned @ right.T

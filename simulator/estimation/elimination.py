@@ -26,8 +26,6 @@ from ballplate.simulator.design.observations.readings import reading_blocks, rea
 from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.machines.protocol import Array, Integers
 
-from .graded import Collected, without_balls
-
 # Rows handled at once: enough for the matrix products to be efficient, few enough to stay in cache.
 ROWS_AT_ONCE = 2048
 
@@ -228,6 +226,8 @@ def _eliminate_graded(
     design: Design, layout: SharedLayout, state: State, x: Array | None
 ) -> Factor:
     """The factor where rows' weights differ much: every row keeps its own relative accuracy."""
+    from .graded import Collected, without_balls
+
     d, s = design.dimension, len(layout)
     balls_kept, gathered = design.tied_balls, _gathered(design, state, x)
     place_of = _places(design, balls_kept)

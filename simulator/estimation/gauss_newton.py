@@ -24,9 +24,6 @@ from .covariance import (
     spectrum,
 )
 from .elimination import Factor, eliminate
-from .graded import triangle
-from .implied_values import implied_count
-from .initial import initial_state
 from .linearisation import Linearisation, linearise
 
 Status = Literal["converged", "not converged", "diverged"]
@@ -132,6 +129,8 @@ def estimate(design: Design, x: Array, settings: GaussNewtonSettings | None = No
     `_tells_of_open`, and only within the neighbourhood: poses slightly off nominal ones would need
     steps of metres. Rank and null space of the solution are those of the nominal design.
     """
+    from .initial import initial_state
+
     start = initial_state(design, x)
     drawn = as_drawn(design)
     solution_held = iterate(design, x, start, settings, drawn)
@@ -156,6 +155,8 @@ def _tells_of_open(
     """
     from scipy.special import fdtrc
 
+    from .implied_values import implied_count
+
     freedom = design.observation_count - design.parameter_count
     freedom -= implied_count(design, followed.state)
     if freedom <= 0:
@@ -179,6 +180,8 @@ def as_drawn(design: Design) -> Spectrum:
 
 def linearised_fit(design: Design, solution: Solution) -> Linearisation:
     """Return the linearisation at an estimate, with the null directions of the nominal design."""
+    from .implied_values import implied_count
+
     drawn = linearise(design) if solution.spectrum.deficiency else None
     layout, state = solution.factor.layout, solution.state
     implied = implied_count(design, state)
@@ -206,6 +209,8 @@ def _shared_step(factor: Factor, spectrum: Spectrum) -> Array:
         rest_root = factor.root @ determined
         rest_root /= np.sqrt((rest_root**2).sum(axis=0))
         return -(spectrum.root @ (rest_root.T @ factor.side))
+    from .graded import triangle
+
     reduced = triangle(in_order(factor) @ determined, factor.side[:, None])
     steps = scipy_linalg().solve_triangular(reduced.root, reduced.side[:, 0], check_finite=False)
     return -(determined[:, reduced.order] @ steps)

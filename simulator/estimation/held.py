@@ -10,7 +10,6 @@ from ballplate.simulator.machines.protocol import Integers
 
 from .covariance import in_order, spectrum
 from .elimination import Factor
-from .graded import triangle
 from .linearisation import Linearisation
 
 
@@ -49,6 +48,8 @@ def _holding(factor: Factor, held: Integers) -> Factor:
         below = np.concatenate([rows, exact])[start:, start:]
         rows[start:, start:] = np.linalg.qr(below, mode="r")
         return replace(changed, root=rows / scale)
+    from .graded import triangle
+
     found = triangle(np.concatenate([rows, exact]), np.zeros((len(rows) + count, 0)))
     return replace(
         changed,

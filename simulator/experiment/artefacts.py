@@ -14,10 +14,9 @@ from ballplate.simulator.geometry.ball_layouts import (
     coincident_balls,
 )
 from ballplate.simulator.inputs.messages import ExperimentError, Steps
-from ballplate.simulator.inputs.own_code import Trust
 from ballplate.simulator.inputs.problems import Problems, written_keys
 from ballplate.simulator.inputs.settings import hint, shorten
-from ballplate.simulator.inputs.tables import read_table
+from ballplate.simulator.inputs.trust import Trust
 from ballplate.simulator.inputs.units import format_length
 from ballplate.simulator.inputs.yamltree import Mapping, Node, Sequence as SequenceNode, written
 
@@ -120,6 +119,8 @@ def _with_coordinates(
 ) -> ArtefactSettings | None:
     if not isinstance(settings, BallsSettings) or settings.file is None:
         return settings
+    from ballplate.simulator.inputs.tables import read_table
+
     steps = (*steps, "file")
     try:
         rows = read_table(trust.file(folder, settings.file), ["ball"], ["x", "y"], ["z"])

@@ -20,7 +20,6 @@ from ballplate.simulator.machines.protocol import Array
 from numpy.typing import NDArray
 from pydantic import Field
 
-from .certificate_tables import read_rows
 from .references import References
 from .stated_values import (
     CommonPartSettings,
@@ -195,6 +194,8 @@ def _table_of_coordinates(
     steps: Steps,
     references: References,
 ) -> tuple[Array, Array] | None:
+    from .certificate_tables import read_rows
+
     problems, steps = references.problems, (*steps, "values")
     forbidden = [axis for axis in AXIS_NAMES if axis not in axes]
     rows_read = read_rows(settings, ["ball"], axes, forbidden, steps, references)

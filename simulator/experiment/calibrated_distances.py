@@ -20,7 +20,6 @@ from ballplate.simulator.machines.protocol import Array
 from numpy.typing import NDArray
 from pydantic import Field
 
-from .certificate_tables import read_rows
 from .references import References
 from .stated_values import (
     CertificateEntry,
@@ -283,6 +282,8 @@ def _entries(
     references: References,
 ) -> FileValues | None:
     """Return the entries of the file or the list of values, or report faults."""
+    from .certificate_tables import read_rows
+
     if is_digital(settings.values):
         return read_digital(settings, wanted, True, steps[:-1], references)
     if isinstance(settings.values, str):

@@ -5,21 +5,17 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from ballplate.simulator.inputs.messages import ExperimentError, Steps
 from ballplate.simulator.inputs.settings import shorten
-from ballplate.simulator.inputs.tables import (
-    FileRow,
-    TableLine,
-    header_cells,
-    read_table,
-    table_lines,
-)
 from ballplate.simulator.machines.protocol import Array
 
 from .references import References
+
+if TYPE_CHECKING:
+    from ballplate.simulator.inputs.tables import FileRow, TableLine
 
 STANDARD, EXPANDED, FACTOR = "standard_uncertainty", "expanded_uncertainty", "k"
 NO_FACTOR = "-"
@@ -38,6 +34,8 @@ def read_rows(
     """Return rows of a CSV file, and the standard uncertainties of each row's `lengths`, NaN
     without any; or report faults.
     """
+    from ballplate.simulator.inputs.tables import read_table, table_lines
+
     problems = references.problems
     columns_allowed = [f"{length}_{name}" for name in (STANDARD, EXPANDED) for length in lengths]
     optional = [*further, STANDARD, EXPANDED, *columns_allowed]
@@ -83,6 +81,8 @@ def read_rows(
 
 
 def _refuse_unclear(lines: list[TableLine], file: str) -> None:
+    from ballplate.simulator.inputs.tables import header_cells
+
     if not lines:
         return
     for place, cell, _, unit in header_cells(file, lines[0], "ball_1,ball_2,distance_mm"):

@@ -5,6 +5,7 @@ frame.
 from __future__ import annotations
 
 from collections.abc import Collection
+from typing import TYPE_CHECKING
 
 import numpy as np
 from ballplate.simulator.computing.numerics import comparable, svd
@@ -29,7 +30,6 @@ from ballplate.simulator.design.observations.distances import CalibratedDistance
 from ballplate.simulator.design.observations.joint_values import JointValues
 from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.design.observations.radius import RadiusCalibration
-from ballplate.simulator.design.observations.star import Stars, observed_stars
 from ballplate.simulator.geometry.artefacts import BryanGaugeSettings
 from ballplate.simulator.geometry.motions import pose_size
 from ballplate.simulator.inputs.messages import ExperimentError
@@ -41,6 +41,9 @@ from ballplate.simulator.machines.settings import build_error_model
 from .influences import with_influences
 from .length_standards import standard_lengths
 from .model import Experiment, Prior
+
+if TYPE_CHECKING:
+    from ballplate.simulator.design.observations.star import Stars
 
 # Evaluation points of an experiment that names none.
 DEFAULT_POINTS = 200
@@ -213,6 +216,8 @@ def _across(
 def _stars(experiment: Experiment) -> list[Stars]:
     if not experiment.stars:
         return []
+    from ballplate.simulator.design.observations.star import observed_stars
+
     return [observed_stars(experiment.stars, list(experiment.probes))]
 
 

@@ -17,8 +17,8 @@ from typing import Any
 
 from ballplate.simulator.inputs.decoding import refuse_long_lines
 from ballplate.simulator.inputs.messages import ExperimentError, Message
-from ballplate.simulator.inputs.own_code import OPENED, Trust
 from ballplate.simulator.inputs.problems import Problems, in_order
+from ballplate.simulator.inputs.trust import OPENED, Trust
 from ballplate.simulator.inputs.yamltree import (
     Mapping,
     Mark,
@@ -32,7 +32,6 @@ from .changes import node_of
 from .construction import construct, evaluable
 from .model import Experiment
 from .resolution import resolve
-from .spans import unspanned
 from .validation import validate_sections
 from .variants import MOST_OF_ALL, in_variants, variant_trees
 
@@ -69,6 +68,8 @@ def load(
         if experiment is None or (all_faults and not tolerant):
             raise ExperimentError(all_faults)
         return (replace(experiment, faults=tuple(all_faults) if tolerant else None),)
+    from .spans import unspanned
+
     experiments = []
     variants_of: dict[Message, list[str]] = {}
     size = 0

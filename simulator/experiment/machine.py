@@ -17,7 +17,6 @@ from ballplate.simulator.inputs.number_arrays import Array
 from ballplate.simulator.inputs.problems import Problems
 from ballplate.simulator.inputs.quantities import LengthFunction, Target
 from ballplate.simulator.inputs.settings import hint
-from ballplate.simulator.inputs.tables import read_table
 from ballplate.simulator.inputs.units import format_length, typed_length
 
 from .bounds import TOLERANCE, check_points
@@ -234,6 +233,8 @@ def _points(settings: Any, machine: Machine | None, references: References) -> A
 def _points_of_file(
     file: str, steps: Steps, machine: Machine | None, references: References
 ) -> Array | None:
+    from ballplate.simulator.inputs.tables import read_table
+
     assert references.dimension is not None
     try:
         rows = read_table(references.file(file), [], AXES[: references.dimension])

@@ -13,13 +13,12 @@ import numpy as np
 from ballplate.simulator.design.noise import Noise
 from ballplate.simulator.design.objects import Machine
 from ballplate.simulator.design.observations.calibration import Calibration
-from ballplate.simulator.design.observations.star import Star
 from ballplate.simulator.geometry.ball_layouts import ArtefactSettings, BallLayout
 from ballplate.simulator.geometry.positions import Pose
 from ballplate.simulator.inputs.messages import ExperimentError, Message, Steps, format_path
 from ballplate.simulator.inputs.number_arrays import Array, Indices
-from ballplate.simulator.inputs.own_code import UNKNOWN, Trust
 from ballplate.simulator.inputs.quantities import Target
+from ballplate.simulator.inputs.trust import UNKNOWN, Trust
 from ballplate.simulator.inputs.yamltree import Mark, Node, mark_of, to_python, written
 
 from .changes import changed_tree
@@ -28,6 +27,7 @@ from .influence_settings import InfluenceSettings
 from .readings_section import ReadingsSettings, no_settings
 
 if TYPE_CHECKING:
+    from ballplate.simulator.design.observations.star import Star
     from ballplate.simulator.machines.protocol import Unit
 
 

@@ -5,15 +5,14 @@ uncertainties, and stars.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import numpy as np
-from ballplate.simulator.design.observations.star import Star
 from ballplate.simulator.geometry.ball_layouts import frozen
 from ballplate.simulator.geometry.motions import rotation_matrix
 from ballplate.simulator.inputs.messages import ExperimentError, Steps
 from ballplate.simulator.inputs.number_arrays import Array
 from ballplate.simulator.inputs.settings import hint, listing
-from ballplate.simulator.inputs.tables import read_table
 from ballplate.simulator.inputs.yamltree import written
 
 from .artefacts import DEFAULT_PROBE
@@ -21,6 +20,9 @@ from .model import Probe
 from .position_sections import HeadSettings, ProbeSettings, StarSettings
 from .references import References, lengths_per_axis
 from .validation import Sections
+
+if TYPE_CHECKING:
+    from ballplate.simulator.design.observations.star import Star
 
 # Stated offsets are nominal, and wrong by this much in metres before anybody need be told.
 NOMINAL = 3e-3
@@ -152,6 +154,10 @@ def resolve_stars(
     sections: Sections, probes: Mapping[str, Probe], references: References
 ) -> tuple[Star, ...]:
     """Return the stars that are right."""
+    if not sections.stars:
+        return ()
+    from ballplate.simulator.design.observations.star import Star
+
     stars = []
     for i, settings in sections.stars.items():
         names = tuple(settings.probes or references.probes)
@@ -178,6 +184,8 @@ def _star_values(
     settings: StarSettings, names: tuple[str, ...], steps: Steps, references: References
 ) -> Array | None:
     """Return co-ordinates (l, d) of a star's tips from its table, or report faults."""
+    from ballplate.simulator.inputs.tables import read_table
+
     letters = list("xyz"[: references.dimension])
     try:
         rows = read_table(references.file(settings.values), ["probe"], letters, [])

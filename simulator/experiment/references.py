@@ -13,9 +13,9 @@ from ballplate.simulator.design.objects import Volume
 from ballplate.simulator.geometry.ball_layouts import ArtefactSettings, BallLayout, corners, frozen
 from ballplate.simulator.inputs.messages import Step, Steps
 from ballplate.simulator.inputs.number_arrays import Array, Indices
-from ballplate.simulator.inputs.own_code import UNKNOWN, Trust
 from ballplate.simulator.inputs.problems import Problems, written_text
 from ballplate.simulator.inputs.settings import hint, listing, shorten
+from ballplate.simulator.inputs.trust import UNKNOWN, Trust
 from ballplate.simulator.inputs.yamltree import Sequence as SequenceNode, written
 
 # Of all positions with their repeats: half a million readings take half a gigabyte.

@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ballplate.simulator.design.noise import Noise
 from ballplate.simulator.design.objects import Machine
 from ballplate.simulator.design.observations.calibration import Calibration
-from ballplate.simulator.design.observations.star import Star
 from ballplate.simulator.inputs.extensions import service
 from ballplate.simulator.inputs.messages import Steps
-from ballplate.simulator.inputs.own_code import Trust
 from ballplate.simulator.inputs.problems import Problems
+from ballplate.simulator.inputs.trust import Trust
 from ballplate.simulator.inputs.yamltree import written
 
 from .artefacts import resolve_references
@@ -35,6 +34,9 @@ from .readings_checks import check_readings
 from .references import References
 from .size_checks import check_size
 from .validation import Sections
+
+if TYPE_CHECKING:
+    from ballplate.simulator.design.observations.star import Star
 
 
 @dataclass(frozen=True)

@@ -44,10 +44,7 @@ from .messages import (
 from .module_finder import own_modules as own_modules
 from .number_arrays import Array as Array, Flags as Flags, Indices as Indices, Integers as Integers
 from .own_code import (
-    OPENED as OPENED,
-    UNKNOWN as UNKNOWN,
     OwnCodeError as OwnCodeError,
-    Trust as Trust,
     error_text as error_text,
     own_array as own_array,
     own_frame as own_frame,
@@ -124,6 +121,7 @@ from .tables import (
     read_table as read_table,
     table_lines as table_lines,
 )
+from .trust import OPENED as OPENED, UNKNOWN as UNKNOWN, Trust as Trust
 from .units import (
     ANGLE_UNITS as ANGLE_UNITS,
     DURATION_UNITS as DURATION_UNITS,

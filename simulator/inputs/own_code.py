@@ -1,4 +1,4 @@
-"""Code of the user's own: whether it is trusted, its calls, and the location of errors in it."""
+"""Calls of the user's own code, and the location of errors in it."""
 
 from __future__ import annotations
 
@@ -7,13 +7,12 @@ import sys
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stdout
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NoReturn
 
 import numpy as np
 
-from .messages import in_one_line, refused
+from .messages import in_one_line
 from .number_arrays import Array
 from .settings import shorten
 from .unusable import UnusableError
@@ -115,31 +114,3 @@ def _definition(call: Callable[..., Any]) -> str:
 
 def _place(file: str, line: int | None) -> str:
     return f"{file}:{line}"
-
-
-@dataclass(frozen=True)
-class Trust:
-    """Permissions of a file: to import its `modules`, and to read files `within` a folder, or
-    anywhere.
-
-    `remedy` is the advice when modules are refused.
-    """
-
-    modules: bool = False
-    within: Path | None = None
-    remedy: str = "allow them if you trust the file"
-
-    def file(self, folder: Path, name: object) -> Path:
-        """Return the path of a name in a folder.
-
-        :raises ExperimentError: it is outside the permitted folder, links followed.
-        """
-        path = folder / str(name)
-        if self.within is not None and not path.resolve().is_relative_to(self.within.resolve()):
-            text = "is outside the folder that files are read from here; copy it there"
-            raise refused(path, text)
-        return path
-
-
-# Of a file that the user opened by its name, and of one that came with another.
-OPENED, UNKNOWN = Trust(modules=True), Trust()

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any, Literal, Self
 
 from ballplate.simulator.inputs.settings import Forms, Settings
-from ballplate.simulator.splines.space import with_boundaries
 from pydantic import Field, model_validator
 
 from .bases import Basis, Ends, Monomial, Polynomial, Spline
@@ -97,6 +96,8 @@ class SplineSettings(Settings):
         >>> SplineSettings(features=(0.5,)).spline().knots
         (0.5, 0.5)
         """
+        from ballplate.simulator.splines.space import with_boundaries
+
         start, end = (
             (False, False)
             if self.slopes is None

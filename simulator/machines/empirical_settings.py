@@ -10,7 +10,6 @@ from pydantic import ConfigDict, Discriminator, Field, Tag, model_validator
 
 from .bases import Basis
 from .basis_settings import BASIS, BasisSettings, SplineSettings, basis_of, without
-from .empirical import empirical_model
 from .protocol import Corner, ErrorModel, ErrorModelKind
 from .terms import (
     VARIABLES,
@@ -59,6 +58,8 @@ class RadialSettings(Settings):
 
     @model_validator(mode="after")
     def _possible(self) -> Self:
+        from .empirical import empirical_model
+
         if self.function not in WITH_CONSTANT:
             without(self, ("constant",), f"the function {self.function}")
         try:
@@ -232,6 +233,8 @@ def _terms(settings: EmpiricalSettings | RotationFunctionsSettings) -> Terms:
 
 
 def _empirical(settings: EmpiricalSettings, lower: Corner, upper: Corner) -> ErrorModel:
+    from .empirical import empirical_model
+
     functions = settings.rotation_functions
     of_rotations = (
         None

@@ -18,7 +18,6 @@ from .arrangement import AXES, Arrangement
 from .bases import Basis, Polynomial, Quoted, SingleFunction
 from .error_names import AXIS_ERRORS, SQUARENESS_ERRORS, AxisError, SquarenessError
 from .protocol import Array, Line, Parameter, Reported
-from .rigid_chain import rigid_chain
 
 # Straightness held at zero at the far end, so that the frame's axes are those of the machine: the x
 # axis gives the direction of x, and the plane of the x and y axes is the xy plane (NPL section
@@ -153,6 +152,8 @@ class KinematicModel:
         translation, rotation = self.motions(x, a)
         from_origin = x - np.asarray(self.lower if self.origin is None else self.origin)
         if self.full_rotations:
+            from .rigid_chain import rigid_chain
+
             return (
                 rigid_chain(self.arrangement, from_origin, translation, rotation, p)[0]
                 - from_origin
@@ -167,6 +168,8 @@ class KinematicModel:
         bases = self._bases(x)
         from_origin = x - np.asarray(self.lower if self.origin is None else self.origin)
         if self.full_rotations:
+            from .rigid_chain import rigid_chain
+
             translation, rotation = self._motions(bases, a, len(x))
             _, by_translation, by_rotation = rigid_chain(
                 self.arrangement, from_origin, translation, rotation, p

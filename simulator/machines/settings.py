@@ -6,7 +6,7 @@ A new error model of the kernel is one file with its keys and an `ErrorModelKind
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Union, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args
 
 from ballplate.simulator.inputs.extensions import provided
 from ballplate.simulator.inputs.messages import Steps
@@ -16,8 +16,10 @@ from pydantic import Field
 
 from .empirical_settings import EMPIRICAL
 from .kinematic_settings import KINEMATIC
-from .metric import MetricModel, Scale, SpatialMetricModel
 from .protocol import Corner, ErrorModel, ErrorModelKind
+
+if TYPE_CHECKING:
+    from .metric import Scale
 
 
 class MetricSettings(Settings):
@@ -42,6 +44,8 @@ class MetricSettings(Settings):
 
 
 def _metric(settings: MetricSettings, lower: Corner, upper: Corner) -> ErrorModel:
+    from .metric import MetricModel, SpatialMetricModel
+
     if len(lower) == 3:
         return SpatialMetricModel(settings.scale != "none", lower, upper)
     return MetricModel(settings.plane_scale, max(b - a for a, b in zip(lower, upper, strict=True)))

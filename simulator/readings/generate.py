@@ -17,7 +17,6 @@ from ballplate.simulator.design.arrays import (
     reading_uncertainties,
 )
 from ballplate.simulator.design.observations.balls import slopes_apart
-from ballplate.simulator.design.observations.joint_lengths import FLAT
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.design.observations.whitening import at_least_exact
 from ballplate.simulator.experiment.layout import lay_out
@@ -177,6 +176,8 @@ def _moved_by_lengths(balls: Array, pairs: Integers, wanted: Array, uncertainty:
     """Return the least displacements (n, d) of balls that bring the lengths of `pairs` (2, m)
     nearest to those `wanted` (m,).
     """
+    from ballplate.simulator.design.observations.joint_lengths import FLAT
+
     ends, index = np.unique(pairs, return_inverse=True)
     index = index.reshape(pairs.shape)
     moved = np.zeros_like(balls)

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from ballplate.presentation import Data, MainTable, Result, aligned, given, number, picked
+from ballplate.presentation import Data, Result, aligned, given, number, picked
 from ballplate.simulator.computing import evenly_spread, single_threaded
 from ballplate.simulator.design import Design, State, shared_layout
 from ballplate.simulator.estimation import holding, linearise, moved, newton_step
 from ballplate.simulator.experiment import Experiment, lay_out, placed_only
-from ballplate.simulator.inputs import ExperimentError, MissingExtensionError, yaml_text
+from ballplate.simulator.inputs import ExperimentError, MissingExtensionError
 from ballplate.simulator.machines import Array, ErrorModel
 from ballplate.simulator.readings import joined, simulated_readings
 from ballplate.uncertainty import Quantity, evaluation_points, uncertainties
+
+if TYPE_CHECKING:
+    from ballplate.presentation import MainTable
 
 from .assumed import PredictionAssumption, assumptions_of
 
@@ -54,6 +57,8 @@ class AssumptionEffect:
     @property
     def entries(self) -> str:
         """The entries of the file that state it, as YAML; each replaces that of its key."""
+        from ballplate.simulator.inputs import yaml_text
+
         return yaml_text(dict(self.assumption.changes), None, 100)
 
 
@@ -129,6 +134,7 @@ class Assumptions(Result):
             "entries": "entries",
             "unit": ["m"] * len(self.effects),
         }
+
         return columns, self.effects
 
     def data(self) -> Data:

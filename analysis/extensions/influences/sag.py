@@ -34,7 +34,6 @@ from ballplate.simulator.inputs import (
     Text,
     hint,
     listing,
-    read_table,
 )
 from ballplate.simulator.machines import Array
 from pydantic import Field
@@ -189,6 +188,8 @@ def _values(path: Path, names: tuple[str, ...]) -> Array:
 
     :raises ExperimentError: the file is invalid; a ball is unknown, missing or there twice.
     """
+    from ballplate.simulator.inputs import read_table
+
     values_by_name = {}
     messages = []
     for row in read_table(path, ["ball"], ["sag"]):

@@ -17,58 +17,22 @@ from ballplate.simulator.computing.numerics import svd
 from ballplate.simulator.inputs.number_arrays import Flags
 from ballplate.simulator.machines.protocol import Array, Integers
 
+from .length_arrays import LengthArrays
 from .whitening import Whitening, whitening
 
 # Displacements that change lengths by less than this, compared with what changes them most, count
 # as changing none: how straight or flat a standard is, is not known so well, and their effect is of
 # second order.
 FLAT = 1e-4
-
 # Certificates whose errors are below this fraction of the readings' noise are exact: whether they
 # contradict one another is beyond what lengths show to first order.
 EXACT_CERTIFICATE = 1e-3
-
 # Smaller uncertainties than this fraction of the noise, beside larger ones, make no difference any
 # more.
 SMALLEST = 1e-6
-
 # Singular values of equations about certificates below this fraction of the largest are those of
 # equations told twice.
 TOLD_TWICE = 1e-9
-
-
-@dataclass(frozen=True)
-class LengthArrays:
-    """Lengths of length standards read in the volume; arrays (m,), metres.
-
-    `first` and `second` index the readings that a length takes part in; `second` is -1 if the
-    other end is the pivot of a Bryan gauge, which is not read: the origin of the first reading's
-    position. `projected` is true if the difference of the corrected points is projected on the
-    standard's nominal direction (m, d) instead of its norm being taken; `with_repeatability` if
-    the readings' own noise along that direction adds to `uncertainty`. Lengths of the same
-    `certificate`, counted from 0, share that error in all positions. `free` is the number of the
-    design's unknown length, -1 if its `value` is known.
-    """
-
-    first: Integers
-    second: Integers
-    value: Array
-    uncertainty: Array
-    projected: Flags
-    direction: Array
-    with_repeatability: Flags
-    certificate: Integers
-    free: Integers | None = None
-
-    @property
-    def to_pivot(self) -> Flags:
-        """Mask (m,) of lengths from a reading to a pivot."""
-        return self.second < 0
-
-    @property
-    def is_known(self) -> Flags:
-        """Mask (m,) of lengths with a certificate."""
-        return np.full(len(self.value), True) if self.free is None else self.free < 0
 
 
 @dataclass(frozen=True)

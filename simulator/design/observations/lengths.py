@@ -6,7 +6,7 @@ They are computed from readings and share their noise.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from ballplate.simulator.inputs.number_arrays import Flags
@@ -14,8 +14,11 @@ from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers
 
 from ..arrays import Design, Observations, Rows, State, locations, reading_noise
 from ..parameters import SharedLayout, shared_layout
-from .joint_lengths import LengthArrays, LengthWhitening, length_whitening_of
+from .length_arrays import LengthArrays
 from .readings import expected_readings, offset_sensitivity
+
+if TYPE_CHECKING:
+    from .joint_lengths import LengthWhitening
 
 
 @dataclass(frozen=True)
@@ -87,6 +90,8 @@ class Lengths(LengthArrays, Observations):
 
 def length_whitening(design: Design) -> LengthWhitening:
     """Return the whitening of the lengths of standards."""
+    from .joint_lengths import length_whitening_of
+
     lengths, readings = design.of(Lengths), design.readings
     noise = reading_noise(design, readings)
     standard = design.balls.artefact[readings.ball[lengths.first]]

@@ -16,7 +16,7 @@ from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.named_files import named_by
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.inputs.own_code import UNKNOWN
+from ballplate.simulator.inputs.trust import UNKNOWN
 from scipy.stats import norm
 
 from tests.observations import wording
