@@ -135,7 +135,8 @@ def run(
     """
     from dataclasses import replace
 
-    from .montecarlo.trial_runs import MOST_TRIALS
+    from ballplate.montecarlo.experiments import MOST_TRIALS
+
     from .results.checked_files import predict
 
     ensure_whole(2, MOST_TRIALS, trials=trials)
@@ -167,8 +168,8 @@ def simulate(
     ['position', 'ball', 'probe', 'x_mm', 'y_mm', 'z_mm']
     """
     import pandas
-    from ballplate.simulator.readings.generate import simulated_readings
     from ballplate.simulator.readings.reading_files import reading_columns
+    from ballplate.simulator.readings.simulated import simulated_readings
 
     ensure_whole(0, seed=seed)
     ensure_type(bool, "True or False", exact=exact)

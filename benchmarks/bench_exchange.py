@@ -16,8 +16,8 @@ from ballplate.extensions.planning.information import Information, pool_informat
 from ballplate.extensions.planning.search import Losses, SelectionProblem, best_addition, full_root
 from ballplate.results.checked_files import predict
 from ballplate.simulator.computing.processes import single_threaded
+from ballplate.simulator.experiment.construction import with_chosen
 from ballplate.simulator.experiment.loading import load
-from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.machines.protocol import Array
 
 POOL = Path("designs/planning/plate-pool.yaml")

@@ -25,10 +25,10 @@ from typing import Any
 import numpy as np
 import pytest
 from ballplate.montecarlo.expansion import Expansion
+from ballplate.montecarlo.experiments import TASK, run_trials, sum_of_task
 from ballplate.montecarlo.reference import Reference, Truth, reference
 from ballplate.montecarlo.replicates import BATCH, draw, estimate_batch
 from ballplate.montecarlo.targets import targets
-from ballplate.montecarlo.trial_runs import TASK, run_trials, sum_of_task
 from ballplate.simulator.design.arrays import State, nominal_state
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.design.observations.readings import reading_blocks

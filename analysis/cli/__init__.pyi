@@ -25,14 +25,20 @@ from .common import (
     write_picture as write_picture,
 )
 from .dispatch import main as main
-from .notes import complain as complain, note as note, print_errors as print_errors, warn as warn
+from .notes import (
+    complain as complain,
+    duration as duration,
+    note as note,
+    print_errors as print_errors,
+    progress as progress,
+    warn as warn,
+)
 from .outputs import (
     PARQUET as PARQUET,
     Needed as Needed,
     Output as Output,
     OutputAction as OutputAction,
     UsageError as UsageError,
-    Writer as Writer,
     add_force as add_force,
     add_output as add_output,
     check_overwritten as check_overwritten,
@@ -40,7 +46,6 @@ from .outputs import (
     write as write,
     write_outputs as write_outputs,
 )
-from .progress_bars import duration as duration, progress as progress
 from .reading_options import (
     KEYS as KEYS,
     add_pairs as add_pairs,

@@ -96,7 +96,7 @@ def run(options: Namespace) -> int:
     from ballplate.results.checked_files import Wanted, check_files
 
     from .common import matching_files, print_json
-    from .progress_bars import progress
+    from .notes import progress
 
     goals = _goals(options)
     wanted = Wanted(

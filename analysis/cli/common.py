@@ -16,11 +16,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from .notes import note, tell_notes, warn
-from .outputs import PICTURE, Contents, UsageError, Writer, add_output, write
+from .outputs import PICTURE, UsageError, add_output, write
 
 if TYPE_CHECKING:
+    from ballplate.presentation.files import Writer
     from ballplate.presentation.result import Result
     from ballplate.simulator.experiment.model import Experiment
+
+    from .outputs import Contents
 
 
 def add_file(parser: ArgumentParser, several: bool = False, needed: bool = True) -> None:
@@ -112,7 +115,7 @@ def at_most(number: int, most: int, noun: str) -> int:
 
 def trial_count(text: str) -> int:
     """Read a number of synthetic data sets from the command line."""
-    from ballplate.montecarlo.trial_runs import MOST_TRIALS
+    from ballplate.montecarlo.experiments import MOST_TRIALS
 
     return at_most(count(text), MOST_TRIALS, "data sets")
 
@@ -237,8 +240,8 @@ def experiments(options: Namespace, planning: bool = False) -> list[Experiment]:
 
     :raises ExperimentError: the errors of all files together.
     """
+    from ballplate.simulator.experiment.changes import unknown_variants
     from ballplate.simulator.experiment.loading import load
-    from ballplate.simulator.experiment.variants import unknown_variants
     from ballplate.simulator.inputs.messages import ExperimentError, Message
 
     chosen_experiments: list[Experiment] = []

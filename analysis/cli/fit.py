@@ -5,6 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ballplate.results.estimator_choice import (
     DRAWN,
@@ -23,8 +24,11 @@ from .common import (
     map_path,
 )
 from .notes import note_singular_values, warn
-from .outputs import UsageError, Writer, add_force, add_output, write
+from .outputs import UsageError, add_force, add_output, write
 from .reading_options import add_pairs, add_readings, observed_readings, warn_of
+
+if TYPE_CHECKING:
+    from ballplate.presentation.files import Writer
 
 DESCRIPTION = (
     "Estimate all parameters of an experiment from readings: a CSV file with the columns position,"

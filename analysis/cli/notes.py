@@ -1,4 +1,4 @@
-"""Notes, warnings and errors on standard error, and the options for more or fewer."""
+"""Notes, warnings, errors and progress on standard error, and the options for more or fewer."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ from argparse import ArgumentParser, Namespace
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from ballplate.rank import Verdict
+    from ballplate.simulator.computing.steps import ProgressStep
     from ballplate.simulator.inputs.messages import Message
 
 
@@ -71,7 +72,7 @@ def told(options: Namespace) -> Iterator[None]:
     if not options.verbose:
         yield
         return
-    from ballplate.simulator.computing.library_versions import versions
+    from ballplate.simulator.computing.numerics import versions
 
     from .outputs import inputs
 
@@ -108,3 +109,70 @@ def print_errors(messages: Iterable[Message], options: Namespace) -> None:
                 line = lines[message.line - 1].replace("\t", " ")
                 mark = " " * len(in_one_line(line[: message.column - 1]))
                 print(f"    {in_one_line(line)}\n    {mark}^", file=sys.stderr)
+
+
+class ProgressDisplay:
+    """Bars of steps in sequence, on a terminal only and not if `is_quiet`."""
+
+    def __init__(self, is_quiet: bool) -> None:
+        self.is_shown = not is_quiet and sys.stderr.isatty()
+        self.bar: Any = None
+
+    def show(self, step: ProgressStep) -> None:
+        """Report the progress of a step."""
+        if not self.is_shown:
+            return
+        if self.bar is None or self.bar.desc != step.what:
+            self.close()
+            self.bar = _bar(step)
+        self.bar.total = step.wanted
+        self.bar.set_postfix_str(step.remark, refresh=False)
+        self.bar.update(step.done - self.bar.n)
+        if step.done == step.wanted:
+            # However soon after the one before.
+            self.bar.refresh()
+
+    def step_aside(self) -> None:
+        """Take the bar away while something else is printed; the next report brings it back."""
+        if self.bar is not None:
+            self.bar.clear()
+
+    def close(self) -> None:
+        """Remove the bar at the end of the step."""
+        if self.bar is not None:
+            self.bar.close()
+
+
+def _bar(step: ProgressStep) -> Any:
+    # Loaded only where it is seen, without a thread and a lock that a command would have to end.
+    from threading import RLock
+
+    from tqdm import tqdm
+
+    tqdm.monitor_interval = 0
+    tqdm.set_lock(RLock())
+    return tqdm(desc=step.what, total=step.wanted, initial=step.before, miniters=1, leave=False)
+
+
+@contextmanager
+def progress(options: Namespace) -> Iterator[ProgressDisplay]:
+    """Return the display of a command's steps."""
+    shown = ProgressDisplay(options.quiet)
+    try:
+        yield shown
+    finally:
+        shown.close()
+
+
+def duration(seconds: float) -> str:
+    """A time to wait as text.
+
+    >>> duration(3.2), duration(200), duration(9000)
+    ('3 s', '3 min 20 s', '2 h 30 min')
+    """
+    whole = round(seconds)
+    if whole < 60:
+        return f"{whole} s"
+    if whole < 3600:
+        return f"{whole // 60} min {whole % 60} s"
+    return f"{whole // 3600} h {whole % 3600 // 60} min"

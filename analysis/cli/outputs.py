@@ -21,19 +21,13 @@ from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
-from ballplate.presentation.files import (
-    UnwrittenError,
-    Writer,
-    beside,
-    is_device,
-    make,
-    real,
-    status_of,
-    write_files,
-)
 from ballplate.simulator.computing.processes import interruptions_blocked
 
 if TYPE_CHECKING:
+    from ballplate.presentation.files import Writer
+
+    Contents = Mapping[Path, Writer | str] | Mapping[Path | None, Writer | str]
+    """Contents of files, as text or by writers; the path is None if no option names the file."""
     from ballplate.simulator.inputs.messages import Message
 
 EXISTS = "exists already; name a new file, or overwrite it with --force"
@@ -47,9 +41,6 @@ NAMING = ("files", "file", "earlier", "map", "tasks", "after")
 
 # What belongs to a store besides its file.
 BESIDE_STORE = ("-wal", "-shm", "-journal", ".lock")
-
-Contents = Mapping[Path, Writer | str] | Mapping[Path | None, Writer | str]
-"""Contents of files, as text or by writers; the path is None if no option names the file."""
 
 
 @dataclass(frozen=True)
@@ -163,6 +154,8 @@ def check_outputs(options: Namespace) -> None:
     if len(screens) > 1:
         raise UsageError(f"{' and '.join(screens)} both go to the screen; name a file for one")
     outputs = [output for output in chosen_outputs if not output.is_screen]
+    if not outputs:
+        return
     _refuse_screen(outputs)
     _refuse_same(outputs)
     _refuse_inputs(outputs, options)
@@ -186,6 +179,8 @@ def check_overwritten(path: Path) -> None:
 
 
 def _refuse_screen(outputs: list[Output]) -> None:
+    from ballplate.presentation.files import is_device, status_of
+
     for output in outputs:
         if str(output.path) == "-":
             raise UsageError(
@@ -199,6 +194,8 @@ def _refuse_screen(outputs: list[Output]) -> None:
 
 
 def _refuse_same(outputs: list[Output]) -> None:
+    from ballplate.presentation.files import real
+
     for first, second in combinations(outputs, 2):
         # There are disks on which capitals make no other file.
         if str(real(first.path)).casefold() == str(real(second.path)).casefold():
@@ -210,6 +207,8 @@ def _refuse_same(outputs: list[Output]) -> None:
 
 
 def _refuse_inputs(outputs: list[Output], options: Namespace) -> None:
+    from ballplate.presentation.files import status_of
+
     there = [
         (output, status_there)
         for output in outputs
@@ -252,6 +251,7 @@ def inputs(options: Namespace, outputs: set[str]) -> Iterator[Path]:
 
 def _reasons_against(output: Output, force: bool) -> list[Message]:
     """Why an output cannot be written."""
+    from ballplate.presentation.files import beside, is_device, make, real
     from ballplate.simulator.inputs.messages import Message
 
     path, reasons = output.path, []
@@ -278,6 +278,7 @@ def _reasons_against(output: Output, force: bool) -> list[Message]:
 
 def write_outputs(writers: Mapping[Path, Writer], force: bool) -> bool:
     """Write files as `write_files` does; False after saying why not."""
+    from ballplate.presentation.files import UnwrittenError, is_device, status_of, write_files
     from ballplate.simulator.inputs.messages import Message
 
     try:

@@ -111,7 +111,7 @@ def run(options: Namespace) -> int:
 
 
 def _write_page(options: Namespace, prediction: Prediction) -> None:
-    from .progress_bars import progress
+    from .notes import progress
 
     with progress(options) as shown:
         text = function("page")(prediction, report=shown.show)
@@ -119,11 +119,10 @@ def _write_page(options: Namespace, prediction: Prediction) -> None:
 
 
 def _trials(experiment: Experiment, options: Namespace) -> Trials:
-    from ballplate.montecarlo.experiments import trials
-    from ballplate.montecarlo.trial_runs import MOST_TRIALS
+    from ballplate.montecarlo.experiments import MOST_TRIALS, trials
     from ballplate.simulator.computing.processes import processors
 
-    from .progress_bars import progress
+    from .notes import progress
 
     with progress(options) as shown:
 

@@ -53,8 +53,8 @@ def add_options(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     """Write one set of readings."""
     from ballplate.simulator.inputs.extensions import service
-    from ballplate.simulator.readings.generate import simulated_readings
     from ballplate.simulator.readings.reading_files import write_readings
+    from ballplate.simulator.readings.simulated import simulated_readings
 
     from .common import single
 

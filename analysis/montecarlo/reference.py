@@ -15,7 +15,7 @@ from ballplate.simulator.estimation.gauss_newton import Solution, iterate
 from ballplate.simulator.estimation.initial import initial_state
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers
-from ballplate.simulator.readings.generate import true_readings
+from ballplate.simulator.readings.simulated import true_readings
 
 from .expansion import Direct, LocalModel, expand
 

@@ -1,5 +1,5 @@
 # Public names of this package, each loaded from its module when it is first used.
-from .files import write_file as write_file, write_files as write_files
+from .files import Writer as Writer, write_file as write_file, write_files as write_files
 from .formatting import (
     SHOWN as SHOWN,
     Data as Data,
@@ -23,8 +23,10 @@ from .pictures import draw_box as draw_box
 from .result import FitResult as FitResult, Result as Result
 from .scenes import (
     MOST_BALLS as MOST_BALLS,
+    Vectors as Vectors,
     box as box,
     box_edges as box_edges,
+    draw_vectors as draw_vectors,
     hull as hull,
     names_fit as names_fit,
     projection as projection,
@@ -57,4 +59,3 @@ from .table_columns import (
     table_lines as table_lines,
     table_rows as table_rows,
 )
-from .vectors import Vectors as Vectors, draw_vectors as draw_vectors

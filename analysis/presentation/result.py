@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ballplate.simulator.inputs.settings import number_of
 
-from .files import write_file
-from .formatting import Data, as_data, as_html, as_latex, as_markdown
+from .formatting import Data, as_data
 
 if TYPE_CHECKING:
     import pandas
@@ -105,14 +104,20 @@ class Result:
 
     def to_markdown(self) -> str:
         """Its main table in Markdown, with label and title above."""
+        from .table_columns import as_markdown
+
         return self._written(as_markdown)
 
     def to_latex(self) -> str:
         """Its main table as a tabular of LaTeX, which needs the package booktabs."""
+        from .table_columns import as_latex
+
         return self._written(as_latex)
 
     def to_html(self) -> str:
         """Its main table as elements of a page; a notebook shows its first 60 rows."""
+        from .table_columns import as_html
+
         return self._written(as_html)
 
     def to_csv(self, path: str | Path | None = None) -> str:
@@ -122,6 +127,8 @@ class Result:
         :raises OSError: the file cannot be written.
         """
         import pandas
+
+        from .files import write_file
 
         frame = pandas.DataFrame(self.rows())
         text = frame.to_csv(index=False, lineterminator="\n")
@@ -136,6 +143,8 @@ class Result:
         return f"<{type(self).__name__} of {self.label}: {self.headline()}>"
 
     def _repr_html_(self) -> str:
+        from .table_columns import as_html
+
         return self._written(as_html, MOST_ROWS_SHOWN)
 
     def _written(self, form: Callable[..., str], most: int | None = None) -> str:

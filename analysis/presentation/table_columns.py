@@ -12,14 +12,19 @@ from __future__ import annotations
 
 import io
 import math
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from html import escape
 from itertools import repeat
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from ballplate.simulator.inputs.decoding import CsvWriter
+from ballplate.simulator.inputs.writing import CsvWriter
 from ballplate.simulator.machines.protocol import Array
 
 from .formatting import Data, aligned, amount_of, ascii_units, number, to_uncertainty, unit_of
+
+if TYPE_CHECKING:
+    import pandas
 
 FACTORS = {"mm": 1e3, "µm": 1e6, "µrad": 1e6, "ppm": 1e6, "arcsec": math.degrees(3600.0)}
 
@@ -148,3 +153,55 @@ def _text(value: Any, form: Any, factor: float, unknown: str) -> str:
             0.0 if abs(v) < ROUNDING else factor * v for v in (value, uncertainty)
         )
     return number(value, form) if isinstance(form, int) else to_uncertainty(value, uncertainty)
+
+
+def as_markdown(
+    title: str, caption: str, frame: pandas.DataFrame, stubs: int, notes: Sequence[str]
+) -> str:
+    """Return a table of texts, whose first columns `stubs` head its rows, in the Markdown of GitHub
+    and Pandoc.
+
+    :raises ImportError: tabulate is missing.
+    """
+    parts = [f"# {_markdown(title)}", f"## {_markdown(caption)}"]
+    if not frame.empty:
+        texts = frame.map(_markdown).rename(columns=_markdown)
+        sides = ["left"] * stubs + ["right"] * (len(frame.columns) - stubs)
+        parts.append(texts.to_markdown(index=False, disable_numparse=True, colalign=sides))
+    return "\n\n".join([*parts, *map(_markdown, notes)]) + "\n"
+
+
+def _markdown(text: str) -> str:
+    r"""Return text with Markdown's special characters escaped.
+
+    >>> _markdown("a|b *c* <d>")
+    'a\\|b \\*c\\* \\<d\\>'
+    """
+    return re.sub(r"([\\`*_{}\[\]<>|#$~])", r"\\\1", text)
+
+
+def as_html(
+    title: str, caption: str, frame: pandas.DataFrame, stubs: int, notes: Sequence[str]
+) -> str:
+    """Return a table of texts as HTML elements, below a title."""
+    rows = [] if frame.empty else [frame.to_html(index=False, border=0)]
+    above = [f"<p><strong>{escape(title)}</strong></p>", f"<p>{escape(caption)}</p>"]
+    return "\n".join([*above, *rows, *(f"<p>{escape(note)}</p>" for note in notes)]) + "\n"
+
+
+def as_latex(
+    title: str, caption: str, frame: pandas.DataFrame, stubs: int, notes: Sequence[str]
+) -> str:
+    r"""Return a table of texts as a tabular for the package booktabs; title, caption and notes are
+    comments.
+
+    :raises ImportError: jinja2 is missing.
+    """
+    sides = "l" * stubs + "r" * (len(frame.columns) - stubs)
+    rows = frame.to_latex(index=False, escape=True, column_format=sides).rstrip()
+    shown = [] if frame.empty else [rows]
+    return "\n".join([_comment(title), _comment(caption), *shown, *map(_comment, notes)]) + "\n"
+
+
+def _comment(text: str) -> str:
+    return f"% {' '.join(text.split())}"

@@ -9,7 +9,7 @@ from ballplate.simulator.computing.numerics import above, comparable, lstsq
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.geometry.motions import without_rigid_motion
-from ballplate.simulator.machines.error_names import AXIS_ERRORS
+from ballplate.simulator.machines.arrangement import AXIS_ERRORS
 from ballplate.simulator.machines.protocol import Array, HasLines
 
 from .directions import ArtefactPart, Direction, FunctionPart, LengthPart, PositionPart

@@ -3,6 +3,8 @@ from .adjustments import (
     FEW as FEW,
     Adjustment as Adjustment,
     adjusted as adjusted,
+    adjustment_data as adjustment_data,
+    adjustment_lines as adjustment_lines,
     few_degrees_of_freedom as few_degrees_of_freedom,
     freedom_words as freedom_words,
 )
@@ -18,7 +20,6 @@ from .checked_files import (
     planned_uncertainty as planned_uncertainty,
     predict as predict,
 )
-from .error_functions import estimated_curves as estimated_curves
 from .estimates import (
     ESTIMATE_COLUMNS as ESTIMATE_COLUMNS,
     ParameterEstimate as ParameterEstimate,
@@ -28,13 +29,15 @@ from .estimator_choice import COMPARED as COMPARED, EstimatorName as EstimatorNa
 from .extension_results import has_exact_values as has_exact_values
 from .fits import Fit as Fit
 from .fitting import fit as fit
-from .lack_of_fit import (
-    LackOfFit as LackOfFit,
-    verdict_content as verdict_content,
-    verdict_data as verdict_data,
-    verdict_line as verdict_line,
+from .plates import (
+    MOST_BALLS as MOST_BALLS,
+    PlateAxes as PlateAxes,
+    axes_of_plates as axes_of_plates,
+    axes_words as axes_words,
+    coordinates_data as coordinates_data,
+    in_plate_axes as in_plate_axes,
+    plate_axes as plate_axes,
 )
-from .plates import axes_of_plates as axes_of_plates
 from .prediction import Prediction as Prediction
 from .qualifications import (
     Qualification as Qualification,
@@ -43,12 +46,15 @@ from .qualifications import (
     qualification_data as qualification_data,
     qualifications_of as qualifications_of,
 )
-from .residuals import reading_residuals as reading_residuals
+from .residuals import (
+    LackOfFit as LackOfFit,
+    estimated_curves as estimated_curves,
+    reading_residuals as reading_residuals,
+    verdict_content as verdict_content,
+    verdict_data as verdict_data,
+    verdict_line as verdict_line,
+)
 from .text_blocks import (
-    MOST_BALLS as MOST_BALLS,
-    adjustment_data as adjustment_data,
-    adjustment_lines as adjustment_lines,
-    coordinates_data as coordinates_data,
     iteration_lines as iteration_lines,
     scale_lines as scale_lines,
     target_lines as target_lines,

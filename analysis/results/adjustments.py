@@ -6,17 +6,25 @@ guideway about the positive axis in its name; the adjustment reverses it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from ballplate.presentation.formatting import (
+    Data,
+    by_name,
+)
 from ballplate.simulator.inputs.settings import number_of
-from ballplate.simulator.machines.error_names import (
+from ballplate.simulator.machines.arrangement import (
     SQUARENESS_ERRORS,
     TRANSLATIONS,
     SquarenessError,
 )
 from ballplate.simulator.machines.protocol import Array, Unit
+
+if TYPE_CHECKING:
+    pass
 
 ARCSECOND = np.pi / (180.0 * 3600.0)
 
@@ -165,3 +173,38 @@ def _amount(value: float) -> str:
         if rounded >= 1e3
         else np.format_float_positional(rounded, trim="-")
     )
+
+
+def _turned(name: str) -> Callable[[Adjustment], float]:
+    def in_practice(row: Adjustment) -> float:
+
+        # Mechanics read arcseconds and µm/m.
+        return float(getattr(row, name) / (ARCSECOND if row.unit == "rad" else 1e-6))
+
+    return in_practice
+
+
+ADJUSTMENT_COLUMNS: dict[str, Any] = {
+    "adjustment": "what",
+    "is off by": _turned("value"),
+    "standard uncertainty": _turned("standard_uncertainty"),
+    "expanded, 95 %": _turned("expanded_uncertainty"),
+    "unit": lambda row: "arcsec" if row.unit == "rad" else "µm/m",
+    "what to do": "words",
+}
+
+
+def adjustment_lines(adjustments: Sequence[Adjustment]) -> list[str]:
+    """Return adjustments as a table of text."""
+    from ballplate.presentation.table_columns import table_lines
+
+    return [
+        *table_lines(ADJUSTMENT_COLUMNS, adjustments),
+        "(errors of scales: true length less reading; errors of angles: excess over 90 deg)",
+    ]
+
+
+def adjustment_data(adjustments: Sequence[Adjustment]) -> Data:
+    """Return adjustments as plain data."""
+    names = "what", "value", "standard_uncertainty", "expanded_uncertainty", "unit", "words"
+    return by_name(adjustments, *names)

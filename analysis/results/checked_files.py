@@ -14,10 +14,10 @@ from ballplate.simulator.computing.processes import single_threaded
 from ballplate.simulator.computing.steps import Report, counted, unreported
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.experiment.changes import unknown_variants
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.experiment.variants import unknown_variants
 from ballplate.simulator.inputs.extensions import service
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.inputs.settings import number_of
@@ -27,8 +27,7 @@ from ballplate.uncertainty.pairs import TaskUncertainty
 from ballplate.uncertainty.summaries import Quantity, tasks_of, uncertainties
 
 from .extension_results import AskedResult
-from .influences import influence_uncertainties
-from .prediction import Advice, Prediction
+from .prediction import Advice, Prediction, influence_uncertainties
 from .qualifications import given_words
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ballplate.simulator.experiment.earlier_campaigns import EarlierCampaign
     from ballplate.simulator.readings.observed_readings import ObservedReadings
 
-    from .lack_of_fit import LackOfFit
+    from .residuals import LackOfFit
 
 
 class AskedResult(Protocol):
@@ -125,7 +125,7 @@ def lack_of_fit(
     squares: float, freedom: int, diagnosis: Suspicion | None, untested: str
 ) -> LackOfFit:
     """Return the lack of fit of a sum of squares; `untested` residuals may have a pattern."""
-    from .lack_of_fit import LackOfFit
+    from .residuals import LackOfFit
 
     if not diagnosis:
         return LackOfFit(squares, freedom, 0, bool(untested))

@@ -11,9 +11,8 @@ import numpy as np
 from ballplate.presentation.files import write_file
 from ballplate.presentation.formatting import Data, given, picked
 from ballplate.presentation.result import FitResult
-from ballplate.presentation.scenes import box_edges, projection
+from ballplate.presentation.scenes import Vectors, box_edges, draw_vectors, projection
 from ballplate.presentation.table_columns import MainTable, table_lines
-from ballplate.presentation.vectors import Vectors, draw_vectors
 from ballplate.rank.verdicts import Verdict
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.gauss_newton import Solution
@@ -27,8 +26,13 @@ from ballplate.simulator.readings.observed_readings import ObservedReadings
 from ballplate.uncertainty.pairs import TaskUncertainty
 from ballplate.uncertainty.summaries import Quantity, tasks_of
 
-from .adjustments import Adjustment, few_degrees_of_freedom, freedom_words
-from .error_functions import EstimatedCurve, estimated_curves
+from .adjustments import (
+    Adjustment,
+    adjustment_data,
+    adjustment_lines,
+    few_degrees_of_freedom,
+    freedom_words,
+)
 from .estimates import (
     ESTIMATE_COLUMNS,
     CorrectedPoints,
@@ -44,18 +48,20 @@ from .extension_results import (
     has_exact_values,
     lack_of_fit,
 )
-from .lack_of_fit import LackOfFit
-from .plates import PlateCoordinates
+from .plates import PlateCoordinates, plate_data, plate_table
 from .prediction import by_label, length_headline, rank_words
-from .residuals import Residual, reading_residuals, residual_groups
+from .residuals import (
+    EstimatedCurve,
+    LackOfFit,
+    Residual,
+    estimated_curves,
+    reading_residuals,
+    residual_groups,
+)
 from .text_blocks import (
-    adjustment_data,
-    adjustment_lines,
     iteration_lines,
     map_lines,
     not_read,
-    plate_data,
-    plate_table,
     quantities_data,
     task_data,
     task_table,

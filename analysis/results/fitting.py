@@ -11,10 +11,9 @@ from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.extensions import service
-from ballplate.simulator.machines.error_names import SquarenessError
-from ballplate.simulator.machines.kinematic import KinematicModel
+from ballplate.simulator.machines.arrangement import SquarenessError
+from ballplate.simulator.machines.kinematic import KinematicModel, PlaneModel
 from ballplate.simulator.machines.metric import SpatialMetricModel
-from ballplate.simulator.machines.plane import PlaneModel
 from ballplate.simulator.readings.observed_readings import ObservedReadings
 from ballplate.uncertainty.summaries import uncertainties
 

@@ -2,16 +2,102 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
+from ballplate.presentation.formatting import Data
 from ballplate.simulator.computing.numerics import blank
 from ballplate.simulator.estimation.covariance import MICROMETRE
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.geometry.axes import PlateAxes, axes_words, in_plate_axes, plate_axes
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.geometry.ball_layouts import AxesSettings, BallLayout
+from ballplate.simulator.inputs.number_arrays import Array
+
+if TYPE_CHECKING:
+    from ballplate.simulator.experiment.model import Experiment
+
+# A ball nominally this near to an axis, as a fraction of its distance from the origin, is meant to
+# be on it.
+ON_AXIS = 1e-6
+
+
+@dataclass(frozen=True)
+class PlateAxes:
+    """The balls at the origin and on axis 0 (x) or 1 (y); `sign` -1: on its negative half."""
+
+    origin: int
+    ball: int
+    axis: int
+    sign: float = 1.0
+
+
+def plate_axes(layout: BallLayout, settings: AxesSettings | None = None) -> PlateAxes | None:
+    """Return the stated axes of a plate or default ones; ``None`` for a single ball.
+
+    By default the first ball is the origin, and the axis goes through the farthest ball that
+    nominally lies on x, otherwise on y. If no ball lies on either, the x axis goes through the
+    ball farthest along x.
+
+    :raises KeyError: a stated ball is not in the layout.
+
+    >>> layout = BallLayout(("a", "b", "c"), np.array([[0.0, 0, 0], [0, 0.2, 0], [0.3, 0.1, 0]]))
+    >>> plate_axes(layout)
+    PlateAxes(origin=0, ball=1, axis=1, sign=1.0)
+    >>> plate_axes(layout, AxesSettings(origin="b", x="c"))
+    PlateAxes(origin=1, ball=2, axis=0, sign=1.0)
+    """
+    if len(layout.names) < 2:
+        return None
+    index = {name: i for i, name in enumerate(layout.names)}
+    if settings is not None:
+        axis = 0 if settings.x is not None else 1
+        origin, ball = index[settings.origin], index[str(settings.x if axis == 0 else settings.y)]
+    else:
+        origin = 0
+        ball, axis = _farthest(layout.coordinates[:, :2] - layout.coordinates[0, :2])
+    along = layout.coordinates[ball, axis] - layout.coordinates[origin, axis]
+    return PlateAxes(origin, ball, axis, -1.0 if along < 0.0 else 1.0)
+
+
+def _farthest(offsets: Array) -> tuple[int, int]:
+    """Return the ball that fixes an axis best, and the axis, from offsets (n, 2) to the origin."""
+    distance = np.linalg.norm(offsets, axis=1)
+    for axis in (0, 1):
+        on_axis = np.abs(offsets[:, 1 - axis]) <= ON_AXIS * distance
+        reach = np.where(on_axis, np.abs(offsets[:, axis]), 0.0)
+        if reach.max() > 0.0:
+            return int(reach.argmax()), axis
+    return int(np.abs(offsets[:, 0]).argmax()), 0
+
+
+def axes_words(axes: PlateAxes, names: tuple[str, ...]) -> str:
+    """Return a description of the axes.
+
+    >>> axes_words(PlateAxes(0, 1, 1), ("a", "b"))
+    'origin: ball a, y axis through ball b'
+    """
+    return (
+        f"origin: ball {names[axes.origin]}, {'xy'[axes.axis]} axis through ball {names[axes.ball]}"
+    )
+
+
+def in_plate_axes(balls: Array, axes: PlateAxes) -> tuple[Array, Array]:
+    """Return co-ordinates (n, 2) of balls (n, 2) in the plate's axes, and their rotation (2, 2).
+
+    >>> in_plate_axes(np.array([[1.0, 1.0], [1.0, 3.0]]), PlateAxes(0, 1, 0))[0].tolist()
+    [[0.0, 0.0], [2.0, 0.0]]
+    """
+    moved = balls - balls[axes.origin]
+    along = axes.sign * moved[axes.ball]
+    c, s = along / np.hypot(*along)
+    to_x = np.array([[c, s], [-s, c]])
+    rotation = to_x if axes.axis == 0 else np.array([[s, -c], [c, s]])
+    turned = moved @ rotation.T
+    # Zero by definition.
+    turned[axes.ball, 1 - axes.axis] = 0.0
+    return turned, rotation
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,3 +187,50 @@ def _weights(coordinates: Array, axes: PlateAxes) -> dict[int, Array]:
         -coordinates[:, 0] / length,
     )
     return {axes.ball: by_ball, axes.origin: -np.eye(2) - by_ball}
+
+
+# Balls of a plate in a table.
+MOST_BALLS = 100
+
+
+def plate_table(plate: PlateCoordinates, named: bool) -> list[str]:
+    """Return a plate's co-ordinates in its own axes as lines of text, of up to `MOST_BALLS`."""
+    from ballplate.presentation.table_columns import table_lines
+
+    title = "co-ordinates of the balls in the plate's own axes"
+    lines = [f"{plate.artefact + ': ' if named else ''}{title} ({plate.words})"]
+    (x, y), (u, v) = (
+        array[:MOST_BALLS].T for array in (plate.coordinates, plate.standard_uncertainties)
+    )
+    columns = {
+        "ball": list(plate.names[:MOST_BALLS]),
+        "x, mm": (x, u),
+        "y, mm": (y, v),
+        "standard uncertainty of x, µm": (u, 3),
+        "of y, µm": (v, 3),
+    }
+    omitted = len(plate.names) - MOST_BALLS
+    more = [f"({omitted} balls more in --json)"] if omitted > 0 else []
+    return [*lines, *table_lines(columns), *more]
+
+
+def plate_data(plate: PlateCoordinates) -> Data:
+    """Return a plate's co-ordinates in its own axes as plain data in metres."""
+    axes = plate.axes
+    return {
+        "axes": {"origin": plate.names[axes.origin], "xy"[axes.axis]: plate.names[axes.ball]},
+        "balls": coordinates_data(plate.names, plate.coordinates, plate.standard_uncertainties),
+    }
+
+
+def coordinates_data(names: Sequence[str], values: Array, u: Array | None = None) -> Data:
+    """Return co-ordinates (n, 2) by balls and axes, with their standard uncertainties."""
+    keys = ("value",) if u is None else ("value", "standard_uncertainty")
+    rows = np.stack([array for array in (values, u) if array is not None], axis=2)
+    return {
+        name: {
+            axis: {**dict(zip(keys, cell, strict=True)), "unit": "m"}
+            for axis, cell in zip("xy", row, strict=True)
+        }
+        for name, row in zip(names, rows.tolist(), strict=True)
+    }

@@ -3,31 +3,28 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
+import numpy as np
 from ballplate.presentation.formatting import Data, given
 from ballplate.presentation.result import Result
 from ballplate.rank.verdicts import Verdict
 from ballplate.simulator.computing.processes import single_threaded
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.inputs.extensions import optional_service, service
 from ballplate.simulator.inputs.settings import hint, number_of
+from ballplate.simulator.machines.protocol import Unit
 from ballplate.uncertainty.pairs import TaskUncertainty
 from ballplate.uncertainty.scale import Scale, scale_of
 from ballplate.uncertainty.summaries import Quantity, tasks_of
 
 from .extension_results import PredictedAssumptions
-from .qualifications import (
-    Qualification,
-    given_words,
-    qualification_data,
-    qualifications_of,
-)
+from .qualifications import Qualification, given_words, qualification_data, qualifications_of
 from .text_blocks import (
     QUANTITY_COLUMNS,
     map_lines,
@@ -50,7 +47,63 @@ if TYPE_CHECKING:
     from ballplate.simulator.experiment.model import Experiment
     from matplotlib.figure import Figure
 
-    from .influences import InfluenceUncertainty
+# Rows of a table; displacements of single readings may be thousands.
+MOST_LINES = 30
+
+
+@dataclass(frozen=True)
+class InfluenceUncertainty:
+    """The standard uncertainty of a parameter of an influence quantity, in its `unit`: `stated`,
+    infinite if unknown, and `predicted` with the readings, NaN if undetermined.
+    """
+
+    name: str
+    unit: Unit
+    stated: float
+    predicted: float
+
+
+def influence_uncertainties(at: Linearisation) -> tuple[InfluenceUncertainty, ...]:
+    """Return the uncertainties of all estimated parameters of influence quantities."""
+    parameters = at.design.influence_parameters
+    rows = np.eye(len(at.layout))[at.layout.influences]
+    predicted = at.of_shared(rows, rows).tolist() if parameters else []
+    return tuple(
+        InfluenceUncertainty(parameter.name, parameter.unit, parameter.uncertainty, u)
+        for parameter, u in zip(parameters, predicted, strict=True)
+    )
+
+
+COLUMNS: dict[str, Any] = {
+    "influence quantity": "name",
+    "stated uncertainty": (
+        lambda row: row.stated if np.isfinite(row.stated) else "unknown",
+        3,
+    ),
+    "with the readings": ("predicted", 3),
+    "unit": "unit",
+}
+
+
+def influence_table(influences: Sequence[InfluenceUncertainty]) -> list[str]:
+    """Return up to `MOST_LINES` rows as lines of text."""
+    from ballplate.presentation.table_columns import table_lines
+
+    omitted = len(influences) - MOST_LINES
+    more = [f"({omitted} more are in --json)"] if omitted > 0 else []
+    return [*table_lines(COLUMNS, influences[:MOST_LINES]), *more]
+
+
+def influence_data(influences: Sequence[InfluenceUncertainty]) -> Data:
+    """Return uncertainties of influence quantities as plain data, by name."""
+    return {
+        influence.name: {
+            "stated_standard_uncertainty": influence.stated,
+            "standard_uncertainty": influence.predicted,
+            "unit": influence.unit,
+        }
+        for influence in influences
+    }
 
 
 @dataclass(frozen=True)
@@ -146,7 +199,6 @@ class Prediction(Result):
 
     def table_lines(self) -> list[str]:
         """Title, verdict and table, without replicates."""
-        from .influences import influence_table
 
         rank, *further = verdict_lines(self.verdict, lengths=self.lengths)
         qualified = self.qualified
@@ -161,7 +213,6 @@ class Prediction(Result):
         return lines if self.assumptions is None else [*lines, "", *self.assumptions.summary()]
 
     def data(self) -> Data:
-        from .influences import influence_data
 
         data = {
             **self.named,

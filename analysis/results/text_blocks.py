@@ -6,10 +6,8 @@ import math
 from collections.abc import Callable, Collection, Sequence
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from ballplate.presentation.formatting import (
     Data,
-    by_name,
     given,
     number,
     percent,
@@ -20,7 +18,6 @@ from ballplate.presentation.formatting import (
 from ballplate.rank.verdicts import GREAT, Verdict
 from ballplate.simulator.computing.numerics import printable
 from ballplate.simulator.inputs.settings import listing, number_of
-from ballplate.simulator.machines.protocol import Array
 from ballplate.uncertainty.pairs import TaskUncertainty, is_determined
 from ballplate.uncertainty.scale import Scale
 from ballplate.uncertainty.summaries import Quantity
@@ -29,14 +26,9 @@ if TYPE_CHECKING:
     from ballplate.simulator.estimation.gauss_newton import Iteration
     from ballplate.simulator.experiment.model import Experiment
 
-    from .adjustments import Adjustment
-    from .plates import PlateCoordinates
 
 # Format of sums of squares.
 FIVE = "{:.5e}".format
-
-# Balls of a plate in a table.
-MOST_BALLS = 100
 
 
 def _counted(quantity: Quantity) -> str:
@@ -298,85 +290,6 @@ def _border(judged: Verdict) -> str:
         return f", then rounding (gap above {GREAT:.0e})"
     first = judged.singular_values[-judged.deficiency]
     return f", then {printable(first):.3g} and below (gap {printable(judged.gap):.2g})"
-
-
-def plate_table(plate: PlateCoordinates, named: bool) -> list[str]:
-    """Return a plate's co-ordinates in its own axes as lines of text, of up to `MOST_BALLS`."""
-    from ballplate.presentation.table_columns import table_lines
-
-    title = "co-ordinates of the balls in the plate's own axes"
-    lines = [f"{plate.artefact + ': ' if named else ''}{title} ({plate.words})"]
-    (x, y), (u, v) = (
-        array[:MOST_BALLS].T for array in (plate.coordinates, plate.standard_uncertainties)
-    )
-    columns = {
-        "ball": list(plate.names[:MOST_BALLS]),
-        "x, mm": (x, u),
-        "y, mm": (y, v),
-        "standard uncertainty of x, µm": (u, 3),
-        "of y, µm": (v, 3),
-    }
-    omitted = len(plate.names) - MOST_BALLS
-    more = [f"({omitted} balls more in --json)"] if omitted > 0 else []
-    return [*lines, *table_lines(columns), *more]
-
-
-def _turned(name: str) -> Callable[[Adjustment], float]:
-    def in_practice(row: Adjustment) -> float:
-        from .adjustments import ARCSECOND
-
-        # Mechanics read arcseconds and µm/m.
-        return float(getattr(row, name) / (ARCSECOND if row.unit == "rad" else 1e-6))
-
-    return in_practice
-
-
-ADJUSTMENT_COLUMNS: dict[str, Any] = {
-    "adjustment": "what",
-    "is off by": _turned("value"),
-    "standard uncertainty": _turned("standard_uncertainty"),
-    "expanded, 95 %": _turned("expanded_uncertainty"),
-    "unit": lambda row: "arcsec" if row.unit == "rad" else "µm/m",
-    "what to do": "words",
-}
-
-
-def adjustment_lines(adjustments: Sequence[Adjustment]) -> list[str]:
-    """Return adjustments as a table of text."""
-    from ballplate.presentation.table_columns import table_lines
-
-    return [
-        *table_lines(ADJUSTMENT_COLUMNS, adjustments),
-        "(errors of scales: true length less reading; errors of angles: excess over 90 deg)",
-    ]
-
-
-def adjustment_data(adjustments: Sequence[Adjustment]) -> Data:
-    """Return adjustments as plain data."""
-    names = "what", "value", "standard_uncertainty", "expanded_uncertainty", "unit", "words"
-    return by_name(adjustments, *names)
-
-
-def plate_data(plate: PlateCoordinates) -> Data:
-    """Return a plate's co-ordinates in its own axes as plain data in metres."""
-    axes = plate.axes
-    return {
-        "axes": {"origin": plate.names[axes.origin], "xy"[axes.axis]: plate.names[axes.ball]},
-        "balls": coordinates_data(plate.names, plate.coordinates, plate.standard_uncertainties),
-    }
-
-
-def coordinates_data(names: Sequence[str], values: Array, u: Array | None = None) -> Data:
-    """Return co-ordinates (n, 2) by balls and axes, with their standard uncertainties."""
-    keys = ("value",) if u is None else ("value", "standard_uncertainty")
-    rows = np.stack([array for array in (values, u) if array is not None], axis=2)
-    return {
-        name: {
-            axis: {**dict(zip(keys, cell, strict=True)), "unit": "m"}
-            for axis, cell in zip("xy", row, strict=True)
-        }
-        for name, row in zip(names, rows.tolist(), strict=True)
-    }
 
 
 def quantities_data(quantities: dict[str, Quantity]) -> Data:

@@ -19,10 +19,9 @@ from ballplate.simulator.estimation.functions import (
     MeasuredPoints,
     Parameters,
 )
-from ballplate.simulator.inputs.extensions import names, provided
+from ballplate.simulator.inputs.extensions import UnusableError, names, provided
 from ballplate.simulator.inputs.settings import shorten
-from ballplate.simulator.inputs.unusable import UnusableError
-from ballplate.simulator.machines.error_names import SQUARENESS_ERRORS
+from ballplate.simulator.machines.arrangement import SQUARENESS_ERRORS
 from ballplate.simulator.machines.protocol import Unit
 
 

@@ -71,7 +71,7 @@ LOADED_BEFORE = (
     "ballplate.montecarlo.experiments",
     "ballplate.montecarlo.comparison_tables",
     "matplotlib.figure",
-    "ballplate.simulator.readings.generate",
+    "ballplate.simulator.readings.simulated",
     "ballplate.simulator.readings.reading_files",
     "scipy.interpolate",
     "scipy.linalg",

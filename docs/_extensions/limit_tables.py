@@ -13,17 +13,17 @@ from ballplate.extensions.planning import criteria, information, pool_groups
 from ballplate.extensions.requirements import root_search
 from ballplate.extensions.splines import error_curve, read_points
 from ballplate.extensions.sweeps import axes, bundle, load, sweep_settings
-from ballplate.montecarlo import trial_runs
+from ballplate.montecarlo import experiments
 from ballplate.simulator.design.observations import calibration, joint_values
 from ballplate.simulator.experiment import (
+    changes,
     priors,
     references,
     sections,
     size_checks,
-    variants,
 )
 from ballplate.simulator.experiment.artefacts import MOST_BALLS, MOST_BALLS_OF_ALL
-from ballplate.simulator.geometry.axes import MOST_DIRECTIONS
+from ballplate.simulator.geometry.artefacts import MOST_DIRECTIONS
 from ballplate.simulator.inputs import decoding, messages, settings, tables, yamltree
 from sphinx.application import Sphinx
 
@@ -59,8 +59,8 @@ LIMITS = {
         "measuring tasks": (settings.MOST_SEVERAL,),
         "priors": (priors.MOST_PRIORS,),
         "variants, and balls, values and points of all": (
-            variants.MOST_VARIANTS,
-            variants.MOST_OF_ALL,
+            changes.MOST_VARIANTS,
+            changes.MOST_OF_ALL,
         ),
         "points of a curve of a true machine": (curve_files.MOST_POINTS,),
         "coefficients of a polynomial in a machine file": (machine_sections.MOST_COEFFICIENTS,),
@@ -69,7 +69,7 @@ LIMITS = {
         "`plan`: candidates": (pool_groups.MOST_CANDIDATES,),
         "`plan`: candidates' matrices, MB": (information.MOST_BYTES // MEGABYTE,),
         "`plan`: evaluation points, with U6 and U6-maximum": (criteria.MOST_POINTS,),
-        "`run --trials`, `compare --trials`: data sets": (trial_runs.MOST_TRIALS,),
+        "`run --trials`, `compare --trials`: data sets": (experiments.MOST_TRIALS,),
         "`sweep`: data sets of a case": (sweep_settings.MOST_TRIALS,),
         "`sweep`: cases, values of an axis": (load.MOST_CELLS, axes.MOST_VALUES),
         "`fit`, `run --reliability`: observations times shared parameters": (

@@ -1,6 +1,4 @@
 # Public names of this package, each loaded from its module when it is first used.
-from .failures import InternalError as InternalError, want_of_memory as want_of_memory
-from .library_versions import versions as versions
 from .numerics import (
     TOUCHED as TOUCHED,
     blank as blank,
@@ -13,6 +11,7 @@ from .numerics import (
     lstsq as lstsq,
     pinv as pinv,
     svd as svd,
+    versions as versions,
 )
 from .processes import (
     begin_worker as begin_worker,
@@ -25,8 +24,10 @@ from .processes import (
 )
 from .steps import (
     EnoughError as EnoughError,
+    InternalError as InternalError,
     ProgressStep as ProgressStep,
     Report as Report,
     counted as counted,
     unreported as unreported,
+    want_of_memory as want_of_memory,
 )

@@ -11,7 +11,10 @@ before they are compared, sorted or chosen from; of equal ones the first is take
 
 from __future__ import annotations
 
+import importlib.metadata
+import platform
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -160,3 +163,28 @@ def evenly_spread(count: int, most: int) -> NDArray[np.int64]:
     ([0, 1, 2], [0, 4, 8])
     """
     return np.unique(np.linspace(0, count - 1, min(count, most)).round().astype(np.int64))
+
+
+@cache
+def versions() -> tuple[tuple[str, str], ...]:
+    """Return pairs of a library and its version, BLAS with its architecture."""
+    import numpy
+    import numpy.linalg
+    import scipy
+    import scipy.linalg
+    from threadpoolctl import threadpool_info
+
+    blas = sorted(
+        {
+            f"{lib['internal_api']} {lib.get('version')} {lib.get('architecture', '')}".strip()
+            for lib in threadpool_info()
+            if lib["user_api"] == "blas"
+        }
+    )
+    return (
+        ("ballplate", importlib.metadata.version("ballplate")),
+        ("python", platform.python_version()),
+        ("numpy", numpy.__version__),
+        ("scipy", scipy.__version__),
+        ("blas", "; ".join(blas)),
+    )

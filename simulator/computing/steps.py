@@ -1,7 +1,9 @@
-"""Steps of a long computation, for display of its progress."""
+"""What a computation reports: steps of its progress, and failures that are not of the input."""
 
 from __future__ import annotations
 
+import errno
+import re
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import TypeVar
@@ -57,3 +59,19 @@ def counted(items: Iterable[Item], unit_name: str, wanted: int, report: Report) 
     for count_done, item in enumerate(items, start=1):
         yield item
         report(ProgressStep(unit_name, count_done, wanted))
+
+
+class InternalError(Exception):
+    """The program has found an error in itself; the message states the contradiction."""
+
+
+WITH_SIZE = re.compile(r"Unable to allocate ([0-9.]+ [KMGTPE]?i?B|[0-9]+ bytes)")
+
+
+def want_of_memory(error: BaseException) -> str | None:
+    """Return the end of a message about lack of memory, if the error is one."""
+    if not isinstance(error, MemoryError) and getattr(error, "errno", None) != errno.ENOMEM:
+        return None
+    match = WITH_SIZE.search(str(error))
+    size = f": there is no room for another {match[1]}" if match else ""
+    return f"needs more memory than is available{size}"

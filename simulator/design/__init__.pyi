@@ -7,9 +7,7 @@ from .arrays import (
     disturbed_readings as disturbed_readings,
     locations as locations,
     measured as measured,
-    nominal_places as nominal_places,
     nominal_state as nominal_state,
-    read_in_positions as read_in_positions,
     reading_noise as reading_noise,
     reading_uncertainties as reading_uncertainties,
 )
@@ -44,6 +42,7 @@ from .observations.coordinates import (
 from .observations.distances import (
     CalibratedDistances as CalibratedDistances,
     DistanceCalibration as DistanceCalibration,
+    RadiusCalibration as RadiusCalibration,
 )
 from .observations.joint_lengths import equation_root as equation_root
 from .observations.joint_values import JointValues as JointValues
@@ -57,7 +56,6 @@ from .observations.lengths import (
     length_whitening as length_whitening,
 )
 from .observations.priors import Priors as Priors
-from .observations.radius import RadiusCalibration as RadiusCalibration
 from .observations.readings import (
     expected_readings as expected_readings,
     offset_sensitivity as offset_sensitivity,

@@ -6,14 +6,14 @@ from __future__ import annotations
 
 import traceback
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, Self, TypeVar, cast
 
 import numpy as np
-from ballplate.simulator.inputs.unusable import UnusableError
+from ballplate.simulator.inputs.extensions import UnusableError
 from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers, Unit
 
 from .influence_quantities import DesignParts, Disturbed, Influence, InfluenceParameter
@@ -228,21 +228,6 @@ def nominal_state(design: Design) -> State:
         design.unknown_lengths.drawn,
         design.influence_values,
     )
-
-
-def nominal_places(design: Design, position: int, balls: Integers) -> Array:
-    """Return nominal locations (m, d) of balls of an artefact in a position."""
-    planned = design.positions
-    return design.balls.places[balls] @ planned.rotations[position].T + planned.origins[position]
-
-
-def read_in_positions(design: Design, readings: Readings) -> Iterator[tuple[int, Integers, Array]]:
-    """Yield for each position with readings its index, the indices (m,) of its readings, and the
-    locations (m, d) of their balls in the artefact's frame.
-    """
-    for k in np.unique(readings.position).tolist():
-        rows = np.flatnonzero(readings.position == k)
-        yield k, rows, design.balls.places[readings.ball[rows]]
 
 
 def locations(design: Design, state: State, readings: Readings) -> Array:

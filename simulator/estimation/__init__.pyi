@@ -11,7 +11,6 @@ from .functions import (
     Parameters as Parameters,
     Places as Places,
     displacements as displacements,
-    function_name as function_name,
     linear_functions as linear_functions,
     point_rows as point_rows,
 )
@@ -30,11 +29,11 @@ from .gauss_newton import (
     newton_step as newton_step,
 )
 from .graded import Collected as Collected, Triangle as Triangle, triangle as triangle
-from .held import holding as holding
 from .implied_values import implied_count as implied_count
 from .initial import initial_state as initial_state
 from .linearisation import (
     LinearFunctions as LinearFunctions,
     Linearisation as Linearisation,
+    holding as holding,
     linearise as linearise,
 )

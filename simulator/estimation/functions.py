@@ -147,20 +147,6 @@ def coordinate_name(design: Design, places: Places, index: int) -> str:
     return f"{places.name(design, int(places.labels[place]))} {AXIS_NAMES[axis]}"
 
 
-def function_name(design: Design, functions: Functions, first: int, second: int) -> str:
-    """Return the name of a co-ordinate from its point's label and its axis, or of a distance from
-    both labels.
-    """
-    assert not isinstance(functions, Parameters)
-    places = functions.places
-    if isinstance(functions, Coordinates):
-        return f"{places.name(design, first)} {AXIS_NAMES[second]}"
-    if functions.pairs is None:
-        return f"{places.name(design, first)} to {places.name(design, second)}"
-    is_pair = (places.labels[functions.pairs] == (first, second)).all(axis=1)
-    return functions.names[int(is_pair.argmax())]
-
-
 @dataclass(frozen=True, eq=False)
 class Displacements:
     """Displacements of `places` (n, d): `common` (n, d, r) times r standard normal variables

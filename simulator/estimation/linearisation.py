@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -10,9 +10,9 @@ from ballplate.simulator.computing.numerics import blank
 from ballplate.simulator.computing.processes import single_threaded
 from ballplate.simulator.design.arrays import Design, State, nominal_state
 from ballplate.simulator.design.parameters import SharedLayout, shared_layout
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.machines.protocol import Array, Integers
 
-from .covariance import MICROMETRE, BallCovariance, Spectrum, ball_covariance, spectrum
+from .covariance import MICROMETRE, BallCovariance, Spectrum, ball_covariance, in_order, spectrum
 from .elimination import Factor, eliminate
 
 
@@ -155,3 +155,49 @@ def linearise(
     layout = design.once(shared_layout)
     factor = eliminate(design, layout, state, x)
     return Linearisation(design, layout, state, factor, spectrum(factor, drawn))
+
+
+@single_threaded
+def holding(at: Linearisation, held: Integers) -> Linearisation:
+    """Return a linearised design with the shared parameters of columns `held` (m,) exactly known.
+
+    No ball is eliminated again. The parameters keep their columns, without uncertainty; quantities
+    are those of the design in which they are no parameters. Steps from the result are meaningless.
+    """
+    factor = _holding(at.factor, held)
+    found = spectrum(factor)
+    free = np.ones(len(at.layout))
+    free[held] = 0.0
+    known = None if found.known is None else free[:, None] * found.known
+    return replace(
+        at, factor=factor, spectrum=replace(found, scale=free * found.scale, known=known)
+    )
+
+
+def _holding(factor: Factor, held: Integers) -> Factor:
+    scale, count = factor.layout.scale, len(held)
+    rows = in_order(factor) * scale
+    rows[:, held] = 0.0
+    # As heavy as the heaviest row: neither undetermined nor the measure of what is.
+    exact = np.zeros((count, len(scale)))
+    exact[np.arange(count), held] = np.abs(rows).max(initial=0.0) or 1.0
+    free = np.ones(len(scale))
+    free[held] = 0.0
+    changed = replace(
+        factor, ball_shared=factor.ball_shared * free, kept_shared=factor.kept_shared * free
+    )
+    if factor.orders is None or factor.alike is None:
+        # The triangle's columns before the first that is held stay as they are.
+        start = int(held.min(initial=len(scale)))
+        below = np.concatenate([rows, exact])[start:, start:]
+        rows[start:, start:] = np.linalg.qr(below, mode="r")
+        return replace(changed, root=rows / scale)
+    from .graded import triangle
+
+    found = triangle(np.concatenate([rows, exact]), np.zeros((len(rows) + count, 0)))
+    return replace(
+        changed,
+        root=found.root / scale[found.order],
+        orders=replace(factor.orders, shared=found.order),
+        alike=_holding(factor.alike, held),
+    )

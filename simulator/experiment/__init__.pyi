@@ -7,23 +7,30 @@ from .bounds import (
     check_inside as check_inside,
     edge_of as edge_of,
     entered as entered,
+    extent as extent,
     length_of as length_of,
     limits_of as limits_of,
-    occupied as occupied,
+    outline as outline,
     shared as shared,
 )
 from .calibrated_coordinates import CalibratedBalls as CalibratedBalls
-from .calibration_kinds import is_of_machine as is_of_machine
-from .calibrations import resolve_calibration as resolve_calibration
+from .calibrations import KINDS as KINDS, resolve_calibration as resolve_calibration
 from .certificate_tables import read_rows as read_rows
-from .changes import node_of as node_of
+from .changes import (
+    is_same_place as is_same_place,
+    node_at as node_at,
+    node_of as node_of,
+    override as override,
+    place_of as place_of,
+    variant_trees as variant_trees,
+)
+from .construction import placed_only as placed_only, with_chosen as with_chosen
 from .earlier_campaigns import (
     LEAST_SIGMA as LEAST_SIGMA,
     EarlierCampaign as EarlierCampaign,
     MapData as MapData,
     MapShare as MapShare,
 )
-from .influence_settings import InfluenceSettings as InfluenceSettings
 from .json_schema import DRAFT as DRAFT, schema as schema, tidied as tidied
 from .layout import lay_out as lay_out
 from .loading import build as build, load as load, trees_of as trees_of, with_pool as with_pool
@@ -52,7 +59,6 @@ from .named_files import (
 )
 from .own_sections import check_installed as check_installed
 from .placements import check_turns as check_turns, resolve_positions as resolve_positions
-from .pool import placed_only as placed_only, with_chosen as with_chosen
 from .pool_sections import (
     GroupSettings as GroupSettings,
     LimitsSettings as LimitsSettings,
@@ -76,6 +82,7 @@ from .readings_section import (
 )
 from .references import References as References, lengths_per_axis as lengths_per_axis
 from .sections import (
+    InfluenceSettings as InfluenceSettings,
     Line as Line,
     MapPriorSettings as MapPriorSettings,
     Seed as Seed,
@@ -94,10 +101,3 @@ from .stated_values import (
     value_name as value_name,
 )
 from .validation import Sections as Sections
-from .variants import (
-    is_same_place as is_same_place,
-    node_at as node_at,
-    override as override,
-    place_of as place_of,
-    variant_trees as variant_trees,
-)

@@ -13,7 +13,6 @@ from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.geometry.positions import (
     AXIS_INDEX,
     Pose,
-    ball_coordinates,
     balls_in_machine,
     corners,
 )
@@ -108,6 +107,7 @@ def shared(rooms: Iterable[Array]) -> Array:
 def length_of(place: Place, low: float, high: float) -> float:
     """Return a place in metres; parts of a room between two ends, the middle if there is no room.
 
+    >>> from ballplate.simulator.inputs import RoomPart
     >>> length_of(0.75, 0.0, 0.5), length_of(RoomPart(0.3, "30 %"), -0.05, 0.95)
     (0.75, 0.25)
     """
@@ -142,14 +142,6 @@ def entered(around: Array, boxes: Array) -> Any:
     low, high = around[..., None, 0, :], around[..., None, 1, :]
     is_beyond = (low >= boxes[:, 1] - TOLERANCE) | (high <= boxes[:, 0] + TOLERANCE)
     return ~is_beyond.any(axis=-1)
-
-
-def occupied(pose: Pose, layout: BallLayout, edge: float | None) -> Array:
-    """Return the lowest and the highest co-ordinates (2, d) of an artefact's balls, and with an
-    `edge` of the plate.
-    """
-    balls = extent(ball_coordinates(pose, layout))
-    return balls if edge is None else extent(np.vstack([balls, outline(pose, layout, edge)]))
 
 
 def _reach(limits: LimitsSettings, references: References) -> dict[str, Array]:

@@ -23,9 +23,9 @@ from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.protocol import Integers
 
-from .influence_settings import InfluenceSettings
 from .model import Experiment, Position
 from .references import References
+from .sections import InfluenceSettings
 from .size_checks import MOST_SHARED
 from .validation import Sections
 

@@ -26,10 +26,13 @@ from ballplate.simulator.design.observations.coordinates import (
     flat,
     no_coordinates,
 )
-from ballplate.simulator.design.observations.distances import CalibratedDistances, no_distances
+from ballplate.simulator.design.observations.distances import (
+    CalibratedDistances,
+    RadiusCalibration,
+    no_distances,
+)
 from ballplate.simulator.design.observations.joint_values import JointValues
 from ballplate.simulator.design.observations.priors import Priors
-from ballplate.simulator.design.observations.radius import RadiusCalibration
 from ballplate.simulator.geometry.artefacts import BryanGaugeSettings
 from ballplate.simulator.geometry.motions import pose_size
 from ballplate.simulator.inputs.messages import ExperimentError

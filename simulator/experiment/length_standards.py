@@ -9,9 +9,8 @@ from itertools import count
 import numpy as np
 from ballplate.simulator.design.arrays import Readings
 from ballplate.simulator.design.objects import UnknownLengths
-from ballplate.simulator.design.observations.distances import DistanceCalibration
+from ballplate.simulator.design.observations.distances import DistanceCalibration, RadiusCalibration
 from ballplate.simulator.design.observations.lengths import Lengths
-from ballplate.simulator.design.observations.radius import RadiusCalibration
 from ballplate.simulator.design.observations.whitening import at_least_exact
 from ballplate.simulator.geometry.artefacts import BryanGaugeSettings, TwoSpheresSettings
 from ballplate.simulator.machines.protocol import Array, Integers

@@ -28,12 +28,11 @@ from ballplate.simulator.inputs.yamltree import (
     read_text,
 )
 
-from .changes import node_of
+from .changes import MOST_OF_ALL, in_variants, node_of, variant_trees
 from .construction import construct, evaluable
 from .model import Experiment
 from .resolution import resolve
 from .validation import validate_sections
-from .variants import MOST_OF_ALL, in_variants, variant_trees
 
 
 def load(

@@ -23,8 +23,8 @@ from ballplate.simulator.inputs.yamltree import Mark, Node, mark_of, to_python, 
 
 from .changes import changed_tree
 from .earlier_campaigns import EarlierCampaign, MapData, MapShare
-from .influence_settings import InfluenceSettings
 from .readings_section import ReadingsSettings, no_settings
+from .sections import InfluenceSettings
 
 if TYPE_CHECKING:
     from ballplate.simulator.design.observations.star import Star

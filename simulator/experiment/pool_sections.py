@@ -12,7 +12,7 @@ from ballplate.simulator.inputs.validation import OpenKinds
 from pydantic import Discriminator, Field, Tag, create_model, model_validator
 
 from .calibrated_coordinates import CalibratedBalls
-from .calibration_kinds import CALIBRATIONS
+from .calibrations import CALIBRATIONS
 from .position_sections import Count, LengthPerAxis, PositionSettings, ProbeNames, QuarterTurns
 
 GROUP_KEYS = ("planes", "levels", "corners", "centres")

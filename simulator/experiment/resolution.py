@@ -19,19 +19,17 @@ from ballplate.simulator.inputs.yamltree import written
 from .artefacts import resolve_references
 from .bounds import Bounds, check_inside, resolve_bounds
 from .calibrations import resolve_calibration
-from .checks import check_calibration_read, check_names, check_radii, check_use
+from .checks import check_calibration_read, check_names, check_radii, check_readings, check_use
 from .error_model_checks import check_true_machine, with_usable_error_model
-from .influence_settings import InfluenceSettings
 from .influences import resolve_influences
 from .machine import resolve_evaluation, resolve_machine, resolve_noise
 from .model import Evaluation, Pool, Position, Prior, Probe
 from .own_sections import needed_service, resolve_own_sections
 from .placements import resolve_positions
 from .position_sections import PositionSettings
-from .priors import resolve_priors
 from .probes import resolve_probes, resolve_stars
-from .readings_checks import check_readings
 from .references import References
+from .sections import InfluenceSettings
 from .size_checks import check_size
 from .validation import Sections
 
@@ -112,7 +110,11 @@ def resolve(
     pool = None
     if candidates is not None:
         pool = service("resolve_pool")(sections, candidates, calibrations, references)
-    priors = resolve_priors(sections, machine, named, probes, references)
+    priors: tuple[Prior, ...] = ()
+    if sections.priors:
+        from .priors import resolve_priors
+
+        priors = resolve_priors(sections, machine, named, probes, references)
     influences = resolve_influences(sections, named, references)
     noise = resolve_noise(sections.noise, problems)
     evaluation = resolve_evaluation(sections, machine, probes, references)

@@ -4,19 +4,22 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Self
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
+from ballplate.simulator.design.influence_quantities import DesignParts, Influence
 from ballplate.simulator.design.noise import Distribution, NoiseSettings
 from ballplate.simulator.geometry.artefacts import ARTEFACTS, AnyArtefactSettings
 from ballplate.simulator.geometry.ball_layouts import Coordinates
+from ballplate.simulator.inputs.messages import Steps
 from ballplate.simulator.inputs.quantity_types import Day, Length, PositiveLength, TargetFunction
 from ballplate.simulator.inputs.settings import Forms, Name, NonEmpty, Settings, Several, Text
+from ballplate.simulator.inputs.validation import OpenKinds
 from ballplate.simulator.machines.settings import ErrorModelSettings
 from ballplate.simulator.machines.truth import TrueMachineSettings, ZeroSettings
 from pydantic import Discriminator, Field, StringConstraints, Tag, model_validator
 
-from .calibration_kinds import CalibrationSettings
-from .influence_settings import AnyInfluence
+from .calibrations import CalibrationSettings
 from .pool_sections import PoolSettings
 from .position_sections import (
     AnyProbe,
@@ -27,6 +30,33 @@ from .position_sections import (
     StarSettings,
 )
 from .readings_section import ReadingsSettings
+from .references import References
+
+
+class InfluenceSettings(Settings):
+    """Settings of one influence quantity, with a `kind` of its own.
+
+    If it is `in_order` it depends on the time of readings: a plan chooses without it.
+    """
+
+    in_order: ClassVar[bool] = False
+
+    def check(self, steps: Steps, positions: Mapping[str, str], references: References) -> None:
+        """Report faults, given `positions`: names with those of their artefacts."""
+
+    def influence(self, design: DesignParts) -> Influence:
+        """Return the influence quantity in a design.
+
+        :raises ValueError: the design lacks data that it needs.
+        """
+        raise NotImplementedError
+
+
+if TYPE_CHECKING:
+    AnyInfluence = InfluenceSettings
+else:
+    AnyInfluence = Annotated[InfluenceSettings, OpenKinds("influences", InfluenceSettings)]
+
 
 # Without control characters, which would reach the terminal.
 Line = Annotated[str, StringConstraints(min_length=1, pattern=r"^[^\x00-\x1f\x7f]*$")]

@@ -12,8 +12,8 @@ from ballplate.simulator.inputs.number_arrays import Array
 from ballplate.simulator.inputs.yamltree import Node
 
 from .bounds import TOLERANCE
+from .changes import node_at
 from .model import Experiment, Position
-from .variants import node_at
 
 SIZES = ("artefacts", "machine.volume", "pool.limits")
 

@@ -9,12 +9,11 @@ from typing import Annotated, Any
 
 from ballplate.simulator.geometry.artefacts import AnyArtefactSettings
 from ballplate.simulator.geometry.ball_layouts import ArtefactSettings
-from ballplate.simulator.inputs.extensions import names, provided
+from ballplate.simulator.inputs.extensions import UnusableError, names, provided
 from ballplate.simulator.inputs.messages import Steps
 from ballplate.simulator.inputs.problems import Problems
 from ballplate.simulator.inputs.quantities import LengthFunction
 from ballplate.simulator.inputs.settings import LACKING, Settings, describe, hint, nearest
-from ballplate.simulator.inputs.unusable import UnusableError
 from ballplate.simulator.inputs.validation import validated_parts
 from ballplate.simulator.inputs.yamltree import (
     Mapping as MappingNode,
@@ -24,8 +23,7 @@ from ballplate.simulator.inputs.yamltree import (
     to_python,
 )
 
-from .calibration_kinds import CalibrationSettings
-from .influence_settings import AnyInfluence, InfluenceSettings
+from .calibrations import CalibrationSettings
 from .pool_sections import (
     GroupSettings,
     LimitsSettings,
@@ -37,7 +35,14 @@ from .pool_sections import (
 )
 from .position_sections import AnyProbe, HeadSettings, PositionSettings, StarSettings
 from .readings_section import ReadingsSettings
-from .sections import AnyPrior, EvaluationSettings, ExperimentSettings, MachineSettings
+from .sections import (
+    AnyInfluence,
+    AnyPrior,
+    EvaluationSettings,
+    ExperimentSettings,
+    InfluenceSettings,
+    MachineSettings,
+)
 
 # A part to be validated: its path, its type and its node.
 Part = tuple[Steps, Any, Node]

@@ -5,12 +5,6 @@ from .artefacts import (
     SquareSettings as SquareSettings,
     TwoSpheresSettings as TwoSpheresSettings,
 )
-from .axes import (
-    PlateAxes as PlateAxes,
-    axes_words as axes_words,
-    in_plate_axes as in_plate_axes,
-    plate_axes as plate_axes,
-)
 from .ball_layouts import (
     ArtefactSettings as ArtefactSettings,
     BallLayout as BallLayout,

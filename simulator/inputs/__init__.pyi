@@ -15,16 +15,15 @@ from .covariances import (
 )
 from .decoding import (
     LINE_END as LINE_END,
-    CsvWriter as CsvWriter,
-    cell_of_text as cell_of_text,
     decoded as decoded,
     refuse_controls as refuse_controls,
     text_and_encoding as text_and_encoding,
-    text_of_cell as text_of_cell,
 )
 from .extensions import (
     MissingExtensionError as MissingExtensionError,
+    UnusableError as UnusableError,
     optional_service as optional_service,
+    provided as provided,
     provider as provider,
     service as service,
     shipped as shipped,
@@ -135,9 +134,13 @@ from .units import (
     plain_unit as plain_unit,
     typed_length as typed_length,
 )
-from .unusable import UnusableError as UnusableError
 from .validation import validated as validated
-from .yaml_writing import yaml_text as yaml_text
+from .writing import (
+    CsvWriter as CsvWriter,
+    cell_of_text as cell_of_text,
+    text_of_cell as text_of_cell,
+    yaml_text as yaml_text,
+)
 from .yamltree import (
     LOADER as LOADER,
     GivenText as GivenText,

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
-from .decoding import text_of_cell
 from .messages import MOST_MESSAGES, ExperimentError, Message, refused
 from .number_arrays import Array
 from .settings import hint, shorten
 from .tables import decimal_sign, pointed, table_lines, wrong_count, wrong_number
 from .units import LENGTH_UNITS, plain_unit
+from .writing import text_of_cell
 from .yamltree import Mark
 
 MOST_NAMES = 2000

@@ -1,13 +1,9 @@
-"""Text files: their encodings, and cells that a spreadsheet would compute."""
+"""Decoding of text files in stated or detected encodings."""
 
 from __future__ import annotations
 
 import codecs
-import csv
 import re
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
-from typing import Any, TextIO
 
 from .messages import refused
 
@@ -124,45 +120,3 @@ def _by_zeros(content: bytes) -> list[tuple[str, str]]:
     if len(content) % 2 or 8 * max(high, low) < max(len(text), 1):
         return []
     return [("utf-16-le" if high > low else "utf-16-be", "UTF-16")]
-
-
-# Start of a formula, behind the apostrophes that protect it; a sign alone is none.
-_FORMULA = re.compile(r"'*[=+\-@\t\r].", re.DOTALL)
-_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|[+-]?(?:inf|nan)")
-
-
-def cell_of_text(text: str) -> str:
-    """Return the cell of a text, with an apostrophe before a formula.
-
-    >>> [cell_of_text(text) for text in ("z low", "=1+1", "-0.25", "'=1+1")]
-    ['z low', "'=1+1", '-0.25', "''=1+1"]
-    """
-    return f"'{text}" if _FORMULA.match(text) and not _NUMBER.fullmatch(text) else text
-
-
-def text_of_cell(cell: str) -> str:
-    """Return the text of a cell.
-
-    >>> [text_of_cell(cell) for cell in ("z low", "'=1+1", "-0.25", "''=1+1", "'quoted'")]
-    ['z low', '=1+1', '-0.25', "'=1+1", "'quoted'"]
-    """
-    protected = cell.startswith("'") and _FORMULA.match(cell) and not _NUMBER.fullmatch(cell[1:])
-    return cell[1:] if protected else cell
-
-
-@dataclass(frozen=True)
-class CsvWriter:
-    """Writer of rows of cells; lines end with a line feed."""
-
-    stream: TextIO
-
-    def writerow(self, cells: Sequence[Any]) -> None:
-        """Write one row."""
-        self.writerows([cells])
-
-    def writerows(self, rows: Iterable[Sequence[Any]]) -> None:
-        """Write several rows."""
-        shown = (
-            [cell_of_text(cell) if isinstance(cell, str) else cell for cell in row] for row in rows
-        )
-        csv.writer(self.stream, lineterminator="\n").writerows(shown)

@@ -21,10 +21,13 @@ from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import TYPE_CHECKING, Any
 
-from .unusable import UnusableError
-
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
+
+
+class UnusableError(Exception):
+    """An object cannot be used; the text has fact, reason and remedy."""
+
 
 ENTRY_POINT = "ballplate.extensions"
 OF_FILES = (
@@ -39,11 +42,11 @@ KINDS = ("commands", "functions", "services", "schemas", *OF_FILES, "quantities"
 
 # Modules and tables of the kernel's names; the kernel has no services and no influence quantities.
 _KERNEL_TABLES = {
-    "commands": ("cli.commands", "COMMANDS"),
+    "commands": ("cli.parsers", "COMMANDS"),
     "functions": ("", "__all__"),
     "schemas": ("cli.schema", "SCHEMAS"),
     "artefacts": ("simulator.geometry.artefacts", "ARTEFACTS"),
-    "calibrations": ("simulator.experiment.calibration_kinds", "KINDS"),
+    "calibrations": ("simulator.experiment.calibrations", "KINDS"),
     "error_models": ("simulator.machines.settings", "KINDS"),
     "true_machines": ("simulator.machines.truth", "KINDS"),
     "sections": ("simulator.experiment.validation", "KEYS"),

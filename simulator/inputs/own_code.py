@@ -12,10 +12,10 @@ from typing import Any, NoReturn
 
 import numpy as np
 
+from .extensions import UnusableError
 from .messages import in_one_line
 from .number_arrays import Array
 from .settings import shorten
-from .unusable import UnusableError
 
 # Packages that are not the user's own.
 OTHERS = frozenset(

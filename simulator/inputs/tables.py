@@ -16,11 +16,11 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
 
-from .decoding import text_of_cell
 from .messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message, refused
 from .quantities import QuantityError, metres_or_radians
 from .settings import hint, listing, shorten
 from .units import LENGTH_UNITS, Units, plain_unit
+from .writing import text_of_cell
 from .yamltree import GivenText, Mark, read_text
 
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs"}

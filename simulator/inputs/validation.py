@@ -11,11 +11,10 @@ from typing import Annotated, Any, ClassVar, TypeVar, cast, get_args
 from pydantic import Field, GetCoreSchemaHandler, GetJsonSchemaHandler, TypeAdapter, ValidationError
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
-from .extensions import MissingExtensionError, names, provided, provider
+from .extensions import MissingExtensionError, UnusableError, names, provided, provider
 from .messages import Steps
 from .problems import Problems
 from .settings import Settings
-from .unusable import UnusableError
 from .yamltree import Node, to_python
 
 T = TypeVar("T")

@@ -3,33 +3,28 @@ from .arrangement import (
     ARRANGEMENT as ARRANGEMENT,
     ARRANGEMENTS as ARRANGEMENTS,
     AXES as AXES,
-    PRODUCTS as PRODUCTS,
-    Arrangement as Arrangement,
-    ArrangementName as ArrangementName,
-    ArrangementSettings as ArrangementSettings,
-    arrangement_of as arrangement_of,
-)
-from .bases import (
-    Basis as Basis,
-    Polynomial as Polynomial,
-    SingleFunction as SingleFunction,
-    Spline as Spline,
-)
-from .empirical_settings import EmpiricalSettings as EmpiricalSettings
-from .error_names import (
     AXIS_ERRORS as AXIS_ERRORS,
     ERRORS as ERRORS,
+    PRODUCTS as PRODUCTS,
     ROTATIONS as ROTATIONS,
     SQUARENESS_ERRORS as SQUARENESS_ERRORS,
     TRANSLATIONS as TRANSLATIONS,
+    Arrangement as Arrangement,
+    ArrangementName as ArrangementName,
+    ArrangementSettings as ArrangementSettings,
     AxisError as AxisError,
     SquarenessError as SquarenessError,
+    arrangement_of as arrangement_of,
 )
+from .bases import Basis as Basis, Polynomial as Polynomial, SingleFunction as SingleFunction
+from .empirical_settings import EmpiricalSettings as EmpiricalSettings
 from .kinematic import (
     ErrorFunction as ErrorFunction,
     KinematicModel as KinematicModel,
+    PlaneModel as PlaneModel,
     carried_vectors as carried_vectors,
     error_function as error_function,
+    in_space as in_space,
 )
 from .kinematic_settings import KinematicSettings as KinematicSettings
 from .metric import (
@@ -38,7 +33,6 @@ from .metric import (
     SpatialMetricModel as SpatialMetricModel,
     parameters_of_metric as parameters_of_metric,
 )
-from .plane import PlaneModel as PlaneModel, in_space as in_space
 from .protocol import (
     Array as Array,
     Corner as Corner,
@@ -60,4 +54,5 @@ from .settings import (
     build_error_model as build_error_model,
     kind_of as kind_of,
 )
+from .spline_basis import Spline as Spline
 from .truth import FurtherTrueMachine as FurtherTrueMachine

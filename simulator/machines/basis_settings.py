@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, Self
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 from ballplate.simulator.inputs.settings import Forms, Settings
 from pydantic import Field, model_validator
 
-from .bases import Basis, Ends, Monomial, Polynomial, Spline
+from .bases import Basis, Ends, Monomial, Polynomial
+
+if TYPE_CHECKING:
+    from .spline_basis import Spline
+
+VARIABLES = ("x", "y", "z")
+
+RadialName = Literal[
+    "multiquadric", "inverse multiquadric", "gaussian", "thin plate", "linear", "cubic"
+]
+WITH_CONSTANT = ("multiquadric", "inverse multiquadric", "gaussian")
 
 
 class SlopesSettings(Settings):
@@ -97,6 +107,8 @@ class SplineSettings(Settings):
         (0.5, 0.5)
         """
         from ballplate.simulator.splines.space import with_boundaries
+
+        from .spline_basis import Spline
 
         start, end = (
             (False, False)

@@ -2,37 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 
 from ballplate.simulator.inputs.settings import Forms, Settings
 from pydantic import ConfigDict, Discriminator, Field, Tag, model_validator
 
 from .bases import Basis
-from .basis_settings import BASIS, BasisSettings, SplineSettings, basis_of, without
-from .protocol import Corner, ErrorModel, ErrorModelKind
-from .terms import (
+from .basis_settings import (
+    BASIS,
     VARIABLES,
     WITH_CONSTANT,
-    Products,
-    Radial,
+    BasisSettings,
     RadialName,
-    Terms,
-    no_terms,
-    quadratic,
-    sums,
-    tensor,
-    univariate,
+    SplineSettings,
+    basis_of,
+    without,
 )
+from .protocol import Corner, ErrorModel, ErrorModelKind
+
+if TYPE_CHECKING:
+    from .terms import Radial, Terms
 
 Centres = Annotated[int, Field(ge=2, le=8)]
 MOST_INTERIOR = 6
-OF_BASIS: dict[str, Callable[..., Products]] = {
-    "sums": sums,
-    "univariate": univariate,
-    "tensor": tensor,
-}
-"""Terms that are made of univariate functions."""
+# Terms that are made of univariate functions.
+OF_BASIS = ("sums", "univariate", "tensor")
 
 
 class RadialSettings(Settings):
@@ -73,6 +67,8 @@ class RadialSettings(Settings):
 
     def terms(self) -> Radial:
         """Return the radial functions."""
+        from .terms import Radial
+
         return Radial(self.centres, self.constant, self.function)
 
 
@@ -184,7 +180,7 @@ def _by_axis(stated: Any) -> list[Any]:
 
 def has_polynomials(settings: EmpiricalSettings | RotationFunctionsSettings) -> bool:
     """True if the functions along some axis are polynomials of stated numbers of coefficients."""
-    return settings.terms in tuple(OF_BASIS) and not all(
+    return settings.terms in OF_BASIS and not all(
         isinstance(basis, SplineSettings) for basis in _by_axis(settings.basis)
     )
 
@@ -225,15 +221,19 @@ def _bases(settings: EmpiricalSettings | RotationFunctionsSettings) -> tuple[Bas
 
 
 def _terms(settings: EmpiricalSettings | RotationFunctionsSettings) -> Terms:
+    from .terms import quadratic, sums, tensor, univariate
+
     if isinstance(settings.terms, RadialSettings):
         return settings.terms.terms()
     if settings.terms == "quadratic":
         return quadratic()
-    return OF_BASIS[settings.terms](*_bases(settings))
+    of_basis = {"sums": sums, "univariate": univariate, "tensor": tensor}
+    return of_basis[settings.terms](*_bases(settings))
 
 
 def _empirical(settings: EmpiricalSettings, lower: Corner, upper: Corner) -> ErrorModel:
     from .empirical import empirical_model
+    from .terms import no_terms
 
     functions = settings.rotation_functions
     of_rotations = (

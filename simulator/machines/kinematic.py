@@ -14,10 +14,16 @@ from typing import ClassVar
 
 import numpy as np
 
-from .arrangement import AXES, Arrangement
+from .arrangement import (
+    AXES,
+    AXIS_ERRORS,
+    SQUARENESS_ERRORS,
+    Arrangement,
+    AxisError,
+    SquarenessError,
+)
 from .bases import Basis, Polynomial, Quoted, SingleFunction
-from .error_names import AXIS_ERRORS, SQUARENESS_ERRORS, AxisError, SquarenessError
-from .protocol import Array, Line, Parameter, Reported
+from .protocol import Array, ErrorModel, HasLines, Line, Parameter, Reported
 
 # Straightness held at zero at the far end, so that the frame's axes are those of the machine: the x
 # axis gives the direction of x, and the plane of the x and y axes is the xy plane (NPL section
@@ -317,3 +323,55 @@ def _crossed(v: Array, w: Array) -> Array:
         j, k = (i + 1) % 3, (i + 2) % 3
         product[:, i] = v[:, j] * w[:, k] - v[:, k] * w[:, j]
     return product
+
+
+@dataclass(frozen=True)
+class PlaneModel:
+    """The errors in x and y of a three-dimensional model, with its z axis at `z` metres throughout.
+
+    Offsets of probes are those in the plane.
+    """
+
+    spatial: ErrorModel
+    z: float
+
+    @property
+    def dimension(self) -> int:
+        return 2
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        return self.spatial.parameters
+
+    def error(self, x: Array, a: Array, p: Array) -> Array:
+        return self.spatial.error(_with_z(x, self.z), a, _with_z(p, 0.0))[:, :2]
+
+    def jacobian(self, x: Array, a: Array, p: Array) -> Array:
+        spatial = self.spatial.jacobian(_with_z(x, self.z), a, _with_z(p, 0.0))
+        return np.ascontiguousarray(spatial[:, :2])
+
+    def lines(self, function: str, t: Array) -> tuple[Line, ...]:
+        """Return the function as the three-dimensional model shows it."""
+        assert isinstance(self.spatial, HasLines)
+        return self.spatial.lines(function, t)
+
+    def reported(self) -> Reported:
+        return self.spatial.reported()
+
+
+def in_space(
+    lower: tuple[float, ...], upper: tuple[float, ...]
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Return the corners of a volume; a plane volume becomes equally high and wide, from z = 0.
+
+    >>> in_space((0.0, 0.5), (1.0, 2.5))
+    ((0.0, 0.5, 0.0), (1.0, 2.5, 2.0))
+    """
+    if len(lower) == 3:
+        return lower, upper
+    height = max(end - start for start, end in zip(lower, upper, strict=True))
+    return (*lower, 0.0), (*upper, height)
+
+
+def _with_z(x: Array, z: float) -> Array:
+    return np.column_stack([x, np.full(len(x), z)])

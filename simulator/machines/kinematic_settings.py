@@ -8,12 +8,17 @@ from ballplate.simulator.inputs.messages import Steps
 from ballplate.simulator.inputs.settings import Forms, Settings
 from pydantic import Field, create_model, model_validator
 
-from .arrangement import ARRANGEMENT, PRODUCTS, ArrangementName, ArrangementSettings, arrangement_of
+from .arrangement import (
+    ARRANGEMENT,
+    AXIS_ERRORS,
+    PRODUCTS,
+    ArrangementName,
+    ArrangementSettings,
+    arrangement_of,
+)
 from .bases import Basis
 from .basis_settings import BASIS, BasisSettings, SplineSettings, basis_of, without
-from .error_names import AXIS_ERRORS
-from .kinematic import in_plane, kinematic_model_of
-from .plane import PlaneModel, in_space
+from .kinematic import PlaneModel, in_plane, in_space, kinematic_model_of
 from .protocol import Corner, ErrorModel, ErrorModelKind
 
 _Function = Forms[Annotated[int, Field(ge=1, le=30)], SplineSettings, SplineSettings]

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Any, Literal, Protocol, runtime_checkable
 
 import numpy as np
+from ballplate.simulator.inputs.extensions import UnusableError
 from ballplate.simulator.inputs.messages import Steps
 from ballplate.simulator.inputs.number_arrays import Array, Integers as Integers
 from ballplate.simulator.inputs.settings import Settings
 from ballplate.simulator.inputs.trust import Trust
-from ballplate.simulator.inputs.unusable import UnusableError
 
 Unit = Literal["m", "rad", "1", "K", "1/K", "m/h", "1/h"]
 

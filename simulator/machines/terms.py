@@ -11,15 +11,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
-from typing import Literal
 
 import numpy as np
 from ballplate.simulator.geometry.ball_layouts import even_grid
 
-from .bases import Basis, Monomial, Quoted, Spline, whole_values
+from .bases import Basis, Monomial, Quoted, whole_values
+from .basis_settings import VARIABLES, RadialName
 from .protocol import Array
-
-VARIABLES = ("x", "y", "z")
 
 
 @dataclass(frozen=True)
@@ -62,6 +60,8 @@ class Products:
 
     def quoted(self) -> Quoted:
         """Return coefficients of monomials; splines remain unchanged, with t and 1 among them."""
+        from .spline_basis import Spline
+
         if all(isinstance(axis, Spline) for axis in self.axes):
             return Quoted(self.names, np.eye(len(self.names)))
         by_axis = list(map(_quoted, self.axes, VARIABLES))
@@ -90,6 +90,8 @@ class Products:
 
 def _quoted(basis: Basis, variable: str) -> Quoted:
     """Return 1, the variable and its interior functions by monomials, or as splines."""
+    from .spline_basis import Spline
+
     if not isinstance(basis, Spline):
         return basis.quoted_whole(variable)
     size = basis.interior().size
@@ -164,11 +166,6 @@ def tensor(*bases: Basis) -> Products:
     return Products(axes, tuple(product(x, y, z)))
 
 
-RadialName = Literal[
-    "multiquadric", "inverse multiquadric", "gaussian", "thin plate", "linear", "cubic"
-]
-
-
 def _thin_plate(squared: Array, constant: float) -> Array:
     """Return r^2 log r of r^2; zero at r = 0."""
     return 0.5 * squared * np.log(np.where(squared == 0.0, 1.0, squared))
@@ -187,7 +184,6 @@ RADIAL: dict[str, Callable[[Array, float], Array]] = {
 Up to sign, each is definite on coefficients orthogonal to linear polynomials: interpolation at
 centres that are not coplanar has one solution.
 """
-WITH_CONSTANT = ("multiquadric", "inverse multiquadric", "gaussian")
 
 
 @dataclass(frozen=True)

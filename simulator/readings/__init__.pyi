@@ -1,21 +1,7 @@
 # Public names of this package, each loaded from its module when it is first used.
-from .generate import (
-    NoReadingError as NoReadingError,
-    Simulated as Simulated,
-    exact_readings as exact_readings,
-    noisy_certificate as noisy_certificate,
-    noisy_readings as noisy_readings,
-    on_stated_machine as on_stated_machine,
-    scale_readings as scale_readings,
-    simulated_readings as simulated_readings,
-    too_large as too_large,
-)
 from .given_points import ensure_points as ensure_points, probe_places as probe_places
-from .observed_readings import (
-    ObservedReadings as ObservedReadings,
-    joined as joined,
-    observe as observe,
-)
+from .joining import joined as joined
+from .observed_readings import ObservedReadings as ObservedReadings, observe as observe
 from .reading_files import AXES as AXES, read_readings as read_readings
 from .reading_sources import (
     Source as Source,
@@ -28,3 +14,14 @@ from .reading_sources import (
     plain_rows as plain_rows,
     position_fingerprints as position_fingerprints,
 )
+from .simulated import (
+    NoReadingError as NoReadingError,
+    Simulated as Simulated,
+    exact_readings as exact_readings,
+    noisy_readings as noisy_readings,
+    on_stated_machine as on_stated_machine,
+    scale_readings as scale_readings,
+    simulated_readings as simulated_readings,
+    too_large as too_large,
+)
+from .true_artefacts import noisy_certificate as noisy_certificate

@@ -12,7 +12,6 @@ import numpy as np
 from ballplate.simulator.design.arrays import Design, Readings, in_sequence, measured, nominal_state
 from ballplate.simulator.design.observations.readings import expected_readings
 from ballplate.simulator.experiment.readings_section import ReadingsSettings, no_settings
-from ballplate.simulator.inputs.decoding import CsvWriter
 from ballplate.simulator.inputs.extensions import optional_service, service
 from ballplate.simulator.inputs.messages import (
     MORE_ERRORS,
@@ -24,16 +23,12 @@ from ballplate.simulator.inputs.messages import (
 from ballplate.simulator.inputs.settings import hint, listing, number_of
 from ballplate.simulator.inputs.tables import FileRow
 from ballplate.simulator.inputs.units import LENGTH_UNITS
+from ballplate.simulator.inputs.writing import CsvWriter
 from ballplate.simulator.inputs.yamltree import GivenText, Mark
 from ballplate.simulator.machines.protocol import Array, Integers
 
-from .observed_readings import (
-    ObservedReadings,
-    ReadingKey,
-    combine_standards,
-    reading_keys,
-    rows_of,
-)
+from .joining import ReadingKey, reading_keys, rows_of
+from .observed_readings import ObservedReadings, combine_standards
 from .reading_sources import Source, source_rows
 
 AXES = ("x", "y", "z")

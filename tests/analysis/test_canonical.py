@@ -10,8 +10,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.rank.directions import elementary_mixture, principal_directions
-from ballplate.rank.verdicts import null_directions, verdict
+from ballplate.rank.verdicts import (
+    elementary_mixture,
+    null_directions,
+    principal_directions,
+    verdict,
+)
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load

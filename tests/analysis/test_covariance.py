@@ -15,7 +15,7 @@ from ballplate.simulator.design.arrays import Design, State
 from ballplate.simulator.estimation.gauss_newton import moved
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.readings.generate import exact_readings
+from ballplate.simulator.readings.simulated import exact_readings
 from numpy.typing import NDArray
 
 from tests.estimation.test_against_dense import (

@@ -12,16 +12,16 @@ import pytest
 import yaml
 from ballplate.results.fits import Fit
 from ballplate.results.fitting import fit
+from ballplate.results.plates import PlateAxes
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.geometry.axes import PlateAxes
 from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.readings.generate import simulated_readings
 from ballplate.simulator.readings.observed_readings import ObservedReadings
+from ballplate.simulator.readings.simulated import simulated_readings
 from numpy.typing import NDArray
 
 ANGLES = Path("designs/hocken_borchardt/angles.yaml")

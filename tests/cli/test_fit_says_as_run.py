@@ -15,8 +15,8 @@ from ballplate.simulator.design.arrays import State
 from ballplate.simulator.estimation.gauss_newton import linearised_fit
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.readings.generate import simulated_readings
 from ballplate.simulator.readings.observed_readings import observe
+from ballplate.simulator.readings.simulated import simulated_readings
 
 from tests.reference.random_experiments import random_experiment
 

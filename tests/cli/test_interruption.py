@@ -17,7 +17,7 @@ from typing import Any
 
 import pytest
 from ballplate.cli import main
-from ballplate.cli.streams import Interruption
+from ballplate.cli.dispatch import Interruption
 from ballplate.extensions.sweeps import execute
 from ballplate.simulator.computing import processes
 from ballplate.simulator.computing.processes import in_processes
@@ -65,7 +65,7 @@ def test_one_that_was_swallowed_ends_a_sweep(
 def test_one_that_was_swallowed_ends_monte_carlo(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    from ballplate.montecarlo import trial_runs as trials
+    from ballplate.montecarlo import experiments as trials
 
     accuracy_of = trials.accuracy_of
 

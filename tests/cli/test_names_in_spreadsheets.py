@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 from ballplate.cli import main
-from ballplate.simulator.inputs.decoding import CsvWriter, cell_of_text, text_of_cell
+from ballplate.simulator.inputs.writing import CsvWriter, cell_of_text, text_of_cell
 from hypothesis import given, strategies as st
 
 EXPERIMENT = """\

@@ -91,7 +91,7 @@ def test_options_that_would_be_ignored(capsys: pytest.CaptureFixture[str]) -> No
 IMPATIENT = """
 import sys
 from ballplate.cli import main
-from ballplate.cli.progress_bars import ProgressDisplay
+from ballplate.cli.notes import ProgressDisplay
 ProgressDisplay.show = lambda self, step: print(step, file=sys.stderr, flush=True)
 sys.exit(main())
 """

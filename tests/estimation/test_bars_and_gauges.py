@@ -22,8 +22,9 @@ from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.machines.truth import true_machine
-from ballplate.simulator.readings.generate import exact_readings, on_true_machine, true_artefacts
 from ballplate.simulator.readings.reading_files import read_readings, write_readings
+from ballplate.simulator.readings.simulated import exact_readings, on_true_machine
+from ballplate.simulator.readings.true_artefacts import true_artefacts
 from scipy.optimize import least_squares
 
 from tests.reference.derivatives import assert_derivative, central_difference

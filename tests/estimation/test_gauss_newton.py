@@ -21,12 +21,8 @@ from ballplate.simulator.estimation.initial import initial_state
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.kinematic import kinematic_model
-from ballplate.simulator.readings.generate import (
-    exact_readings,
-    noisy_certificate,
-    noisy_readings,
-    scale_readings,
-)
+from ballplate.simulator.readings.simulated import exact_readings, noisy_readings, scale_readings
+from ballplate.simulator.readings.true_artefacts import noisy_certificate
 from scipy.stats import f
 
 from tests.reference.designs import altered, corner_sides, grid, plate_design, six_positions
@@ -184,7 +180,7 @@ def test_too_few_iterations_are_a_status() -> None:
 
 
 def test_impossible_errors_have_no_reading() -> None:
-    from ballplate.simulator.readings.generate import NoReadingError
+    from ballplate.simulator.readings.simulated import NoReadingError
 
     model = kinematic_model(ARRANGEMENTS["MB2"], 5, 5, (0, 0, 0), (1, 1, 1))
     with pytest.raises(NoReadingError):

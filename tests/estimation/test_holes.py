@@ -24,9 +24,9 @@ from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import written_in_python
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.readings.generate import simulated_readings
 from ballplate.simulator.readings.observed_readings import observe
 from ballplate.simulator.readings.reading_files import read_readings, write_readings
+from ballplate.simulator.readings.simulated import simulated_readings
 
 from tests.reference import dense
 from tests.reference.small_quickstart import PLATE, small_sections

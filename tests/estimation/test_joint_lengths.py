@@ -33,7 +33,8 @@ from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from ballplate.simulator.machines.metric import SpatialMetricModel
 from ballplate.simulator.machines.truth import true_machine
-from ballplate.simulator.readings.generate import exact_readings, on_true_machine, true_artefacts
+from ballplate.simulator.readings.simulated import exact_readings, on_true_machine
+from ballplate.simulator.readings.true_artefacts import true_artefacts
 from numpy.typing import NDArray
 
 from tests.estimation.test_against_dense import compare, in_reference_basis

@@ -22,8 +22,8 @@ from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.truth import true_parameters
-from ballplate.simulator.readings.generate import exact_readings
 from ballplate.simulator.readings.reading_files import read_readings, write_readings
+from ballplate.simulator.readings.simulated import exact_readings
 from scipy.spatial.transform import Rotation
 
 from tests.estimation import wording

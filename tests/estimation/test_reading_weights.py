@@ -17,8 +17,8 @@ from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.readings_section import no_settings
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.readings.generate import exact_readings, noisy_readings
 from ballplate.simulator.readings.reading_files import read_readings, write_readings
+from ballplate.simulator.readings.simulated import exact_readings, noisy_readings
 
 from tests.reference.small_quickstart import small_quickstart
 

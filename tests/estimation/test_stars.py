@@ -29,7 +29,7 @@ from ballplate.simulator.experiment.loading import written_in_python
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.readings.generate import simulated_readings
+from ballplate.simulator.readings.simulated import simulated_readings
 from scipy.optimize import minimize
 
 from tests.reference import dense

@@ -20,7 +20,7 @@ from ballplate.simulator.geometry.ball_layouts import BallLayout, coincident_bal
 from ballplate.simulator.inputs.decoding import MOST_IN_LINE, refuse_long_lines
 from ballplate.simulator.inputs.messages import MOST_MESSAGES, ExperimentError
 from ballplate.simulator.inputs.yamltree import parse_tree, read_text
-from ballplate.simulator.readings.generate import true_artefacts
+from ballplate.simulator.readings.true_artefacts import true_artefacts
 
 from tests.experiment import wording
 

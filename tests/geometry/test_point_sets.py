@@ -7,8 +7,8 @@ from itertools import product
 import numpy as np
 import pytest
 from ballplate.extensions.certificates.datum import Datum, chosen_datum, in_datum, relative_to
+from ballplate.results.plates import PlateAxes, plate_axes
 from ballplate.simulator.design.objects import Volume
-from ballplate.simulator.geometry.axes import PlateAxes, plate_axes
 from ballplate.simulator.geometry.ball_layouts import BallLayout
 from ballplate.simulator.geometry.motions import (
     fit_motion,

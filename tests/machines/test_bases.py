@@ -4,15 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from ballplate.simulator.machines.bases import (
-    Basis,
-    Ends,
-    Monomial,
-    Polynomial,
-    Spline,
-    whole_values,
-)
+from ballplate.simulator.machines.bases import Basis, Ends, Monomial, Polynomial, whole_values
 from ballplate.simulator.machines.basis_settings import SplineSettings
+from ballplate.simulator.machines.spline_basis import Spline
 from hypothesis import given, strategies as st
 from scipy.interpolate import BSpline
 from scipy.linalg import null_space

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from ballplate.simulator.machines.bases import Monomial, Polynomial, Spline
+from ballplate.simulator.machines.bases import Monomial, Polynomial
 from ballplate.simulator.machines.empirical import (
     FRAME,
     FUNCTIONS,
     EmpiricalModel,
     empirical_model,
 )
+from ballplate.simulator.machines.spline_basis import Spline
 from ballplate.simulator.machines.terms import Radial, Terms, quadratic, sums, tensor
 
 LOWER, UPPER = (-0.2, 0.1, 0.0), (0.8, 0.7, 1.3)

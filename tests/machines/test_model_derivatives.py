@@ -7,17 +7,19 @@ import pytest
 from ballplate.extensions.machine_files.description import fitted_volumetric, true_volumetric
 from ballplate.extensions.machine_files.framing import FramedModel
 from ballplate.extensions.machine_files.machine_file import load_machine
+from ballplate.montecarlo.experiments import JoinedModel
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS, Arrangement
-from ballplate.simulator.machines.bases import Monomial, Polynomial, Spline
+from ballplate.simulator.machines.bases import Monomial, Polynomial
 from ballplate.simulator.machines.empirical import empirical_model
 from ballplate.simulator.machines.kinematic import (
+    PlaneModel,
     in_plane,
     kinematic_model,
     kinematic_model_of,
 )
 from ballplate.simulator.machines.metric import MetricModel, SpatialMetricModel
-from ballplate.simulator.machines.plane import PlaneModel
 from ballplate.simulator.machines.protocol import ErrorModel, HasLines
+from ballplate.simulator.machines.spline_basis import Spline
 from ballplate.simulator.machines.terms import (
     RADIAL,
     Radial,
@@ -27,7 +29,6 @@ from ballplate.simulator.machines.terms import (
     tensor,
     univariate,
 )
-from ballplate.simulator.machines.truth import JoinedModel
 from hypothesis import given, strategies as st
 
 from tests.reference.derivatives import assert_derivative, complex_step

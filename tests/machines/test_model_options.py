@@ -10,17 +10,21 @@ import pytest
 from ballplate.extensions.machine_files.curves import Points, curves_model
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.machines.arrangement import ARRANGEMENTS
-from ballplate.simulator.machines.bases import Polynomial, Spline
+from ballplate.simulator.machines.arrangement import (
+    ARRANGEMENTS,
+    AXIS_ERRORS,
+    ERRORS,
+    SQUARENESS_ERRORS,
+)
+from ballplate.simulator.machines.bases import Polynomial
+from ballplate.simulator.machines.basis_settings import WITH_CONSTANT, RadialName
 from ballplate.simulator.machines.empirical import empirical_model
-from ballplate.simulator.machines.error_names import AXIS_ERRORS, ERRORS, SQUARENESS_ERRORS
 from ballplate.simulator.machines.kinematic import KinematicModel, in_plane, kinematic_model_of
 from ballplate.simulator.machines.settings import build_error_model
+from ballplate.simulator.machines.spline_basis import Spline
 from ballplate.simulator.machines.terms import (
     RADIAL,
-    WITH_CONSTANT,
     Radial,
-    RadialName,
     sums,
     univariate,
 )

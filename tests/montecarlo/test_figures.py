@@ -15,7 +15,7 @@ import pytest
 import scipy.stats
 from ballplate.montecarlo.accumulator import accumulate
 from ballplate.montecarlo.comparison_tables import trials_data, trials_lines, with_error
-from ballplate.montecarlo.experiments import trials, true_experiment
+from ballplate.montecarlo.experiments import run_trials, trials, true_experiment
 from ballplate.montecarlo.figures import (
     MonteCarloComparison,
     MonteCarloEstimate,
@@ -25,7 +25,6 @@ from ballplate.montecarlo.figures import (
 from ballplate.montecarlo.reference import Reference, reference
 from ballplate.montecarlo.replicates import BATCH, Estimates, estimate_batch
 from ballplate.montecarlo.targets import MonteCarloQuantity, sample_of_pairs, targets
-from ballplate.montecarlo.trial_runs import run_trials
 from ballplate.results.checked_files import predict
 from ballplate.simulator.design.arrays import Design, nominal_state
 from ballplate.simulator.design.observations.distances import CalibratedDistances

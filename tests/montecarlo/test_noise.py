@@ -17,7 +17,11 @@ from ballplate.montecarlo.replicates import BATCH, draw
 from ballplate.simulator.design.noise import Noise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.readings.generate import exact_readings, noisy_readings, simulated_readings
+from ballplate.simulator.readings.simulated import (
+    exact_readings,
+    noisy_readings,
+    simulated_readings,
+)
 from numpy.typing import NDArray
 from scipy import stats
 

@@ -14,7 +14,8 @@ from pathlib import Path
 import ballplate as bp
 import pytest
 from ballplate.extensions.diagnosis import wording
-from ballplate.simulator.design.observations import calibration, radius
+from ballplate.simulator.design.observations import calibration
+from ballplate.simulator.experiment import calibrations
 
 from tests.mutation.forks import change, in_fork, probed
 from tests.mutation.mutants import KINDS, mutants, mutated, source_of
@@ -94,7 +95,7 @@ def test_a_setting_is_changed_where_it_is_imported() -> None:
 
     def changed() -> list[float]:
         change(every[0])
-        return [calibration.FAR_FROM_DRAWING, radius.FAR_FROM_DRAWING]
+        return [calibration.FAR_FROM_DRAWING, calibrations.FAR_FROM_DRAWING]
 
     assert len(every) == 1
     assert in_fork(changed, 60.0) == [2.0 * calibration.FAR_FROM_DRAWING] * 2

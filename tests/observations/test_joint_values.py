@@ -19,7 +19,7 @@ from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.readings.generate import true_artefacts
+from ballplate.simulator.readings.true_artefacts import true_artefacts
 from numpy.typing import NDArray
 from scipy.linalg import null_space
 from scipy.stats import norm

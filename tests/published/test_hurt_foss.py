@@ -21,10 +21,11 @@ from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.geometry.axes import directions
+from ballplate.simulator.geometry.artefacts import directions
 from ballplate.simulator.machines.metric import SpatialMetricModel, parameters_of_metric
-from ballplate.simulator.readings.generate import exact_readings, noisy_certificate, noisy_readings
 from ballplate.simulator.readings.reading_files import read_readings
+from ballplate.simulator.readings.simulated import exact_readings, noisy_readings
+from ballplate.simulator.readings.true_artefacts import noisy_certificate
 
 FOLDER = Path("designs/hurt_foss")
 NAMES = ("scale x", "scale y", "scale z", "C0Y", "B0Z", "A0Z")

@@ -23,8 +23,9 @@ from ballplate.simulator.design.objects import Balls
 from ballplate.simulator.estimation.gauss_newton import estimate, newton_step
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.inputs.yamltree import to_python, written
-from ballplate.simulator.readings.generate import exact_readings, on_stated_machine
-from ballplate.simulator.readings.observed_readings import joined, observe, reading_keys
+from ballplate.simulator.readings.joining import joined, reading_keys
+from ballplate.simulator.readings.observed_readings import observe
+from ballplate.simulator.readings.simulated import exact_readings, on_stated_machine
 
 from tests.reference.small_quickstart import small_quickstart, small_sections
 

@@ -11,17 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from ballplate.results import PlateAxes, axes_words, plate_axes
 from ballplate.simulator.computing import lstsq
 from ballplate.simulator.design import Flags
-from ballplate.simulator.geometry import (
-    BallLayout,
-    PlateAxes,
-    axes_words,
-    fit_motion,
-    plate_axes,
-    rigid_motions,
-    without_rigid_motion,
-)
+from ballplate.simulator.geometry import BallLayout, fit_motion, rigid_motions, without_rigid_motion
 from ballplate.simulator.inputs import hint
 from ballplate.simulator.machines import Array
 

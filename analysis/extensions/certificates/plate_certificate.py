@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 from ballplate.extensions.influences import TemperaturesSettings
 from ballplate.presentation import write_file
-from ballplate.results import Fit
+from ballplate.results import Fit, plate_axes
 from ballplate.simulator.computing import blank, single_threaded
 from ballplate.simulator.estimation import MICROMETRE, BallPlaces, Linearisation, displacements
 from ballplate.simulator.experiment import Experiment
-from ballplate.simulator.geometry import BallLayout, plate_axes
+from ballplate.simulator.geometry import BallLayout
 from ballplate.simulator.inputs import MOST_NAMES, hint, listing, refused, to_python
 from ballplate.simulator.machines import Array, Integers
 from ballplate.uncertainty import OWN_SCALES, expansion, pairs_of, scale_of

@@ -19,7 +19,8 @@ from ballplate.presentation import (
 )
 from ballplate.simulator.computing import comparable
 from ballplate.simulator.design import Design
-from ballplate.simulator.estimation import Functions, function_name
+from ballplate.simulator.estimation import Coordinates, Functions, Parameters
+from ballplate.simulator.geometry import AXIS_NAMES
 from ballplate.simulator.inputs import listed
 from ballplate.simulator.machines import Array, Integers
 from ballplate.uncertainty import QUANTITIES
@@ -452,3 +453,17 @@ def _pattern_data(result: Reliability, k: int) -> Data:
             if result.effects[symbol].first[k] >= 0
         },
     }
+
+
+def function_name(design: Design, functions: Functions, first: int, second: int) -> str:
+    """Return the name of a co-ordinate from its point's label and its axis, or of a distance from
+    both labels.
+    """
+    assert not isinstance(functions, Parameters)
+    places = functions.places
+    if isinstance(functions, Coordinates):
+        return f"{places.name(design, first)} {AXIS_NAMES[second]}"
+    if functions.pairs is None:
+        return f"{places.name(design, first)} to {places.name(design, second)}"
+    is_pair = (places.labels[functions.pairs] == (first, second)).all(axis=1)
+    return functions.names[int(is_pair.argmax())]

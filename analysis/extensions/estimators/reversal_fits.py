@@ -12,12 +12,12 @@ from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
-from ballplate.results import Fit, ParameterEstimate, axes_of_plates, fit
+from ballplate.results import Fit, ParameterEstimate, axes_of_plates, fit, in_plate_axes
 from ballplate.simulator.computing import single_threaded
 from ballplate.simulator.design import Design, SharedLayout, State, reading_noise
 from ballplate.simulator.estimation import estimate
 from ballplate.simulator.experiment import Experiment
-from ballplate.simulator.geometry import in_plate_axes, rotation_from_vector, vector_from_rotation
+from ballplate.simulator.geometry import rotation_from_vector, vector_from_rotation
 from ballplate.simulator.inputs import ExperimentError, Message, Steps, listing
 from ballplate.simulator.machines import Array, Integers, MetricSettings, Scale, build_error_model
 from ballplate.simulator.readings import ObservedReadings

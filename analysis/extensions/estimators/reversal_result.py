@@ -19,8 +19,15 @@ from ballplate.presentation import (
     picked,
     table_lines,
 )
-from ballplate.results import MOST_BALLS, Fit, ParameterEstimate, coordinates_data
-from ballplate.simulator.geometry import PlateAxes, axes_words, in_plate_axes
+from ballplate.results import (
+    MOST_BALLS,
+    Fit,
+    ParameterEstimate,
+    PlateAxes,
+    axes_words,
+    coordinates_data,
+    in_plate_axes,
+)
 from ballplate.simulator.inputs import listing
 from ballplate.simulator.machines import Array, Integers, Scale
 from ballplate.simulator.readings import ObservedReadings

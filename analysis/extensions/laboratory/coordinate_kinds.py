@@ -5,12 +5,7 @@ co-ordinates, with or without the machine's own correction.
 from __future__ import annotations
 
 import numpy as np
-from ballplate.simulator.design import (
-    Design,
-    Readings,
-    nominal_places,
-    read_in_positions,
-)
+from ballplate.simulator.design import Design, Readings
 from ballplate.simulator.experiment import CompensationSettings, ReadingsSettings
 from ballplate.simulator.geometry import fixes_pose
 from ballplate.simulator.inputs import listing, refused
@@ -19,6 +14,8 @@ from ballplate.simulator.readings import NoReadingError, scale_readings
 
 from .consensus import consensus_motion
 from .gross_errors import AGAINST_DRAWING, ball_pitches
+from .plate_sizes import read_in_positions
+from .probe_matching import nominal_places
 
 
 def controller_offsets(design: Design, settings: ReadingsSettings) -> Array:

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from ballplate.simulator.design import Design, nominal_places
+from ballplate.simulator.design import Design
 from ballplate.simulator.inputs import listing
 from ballplate.simulator.machines import Array
 
 from .gross_errors import AGAINST_DRAWING, ball_pitches
+from .probe_matching import nominal_places
 
 
 def mistaken_positions(design: Design, x: Array) -> dict[int, int]:

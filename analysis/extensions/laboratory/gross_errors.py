@@ -21,19 +21,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from ballplate.simulator.computing import svd
-from ballplate.simulator.design import (
-    Design,
-    Flags,
-    Lengths,
-    Priors,
-    read_in_positions,
-    seen_places,
-)
+from ballplate.simulator.design import Design, Flags, Lengths, Priors, seen_places
 from ballplate.simulator.estimation import initial_state
 from ballplate.simulator.geometry import fit_motion
 from ballplate.simulator.machines import Array, Integers
 
 from .consensus import consensus_motion, distances
+from .plate_sizes import read_in_positions
 
 AGAINST_DRAWING = 0.3
 # Extent across a line, as a fraction of that along it, below which balls are in one line.

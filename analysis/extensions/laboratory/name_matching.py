@@ -12,13 +12,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from ballplate.simulator.design import Design, nominal_places
+from ballplate.simulator.design import Design
 from ballplate.simulator.geometry import fit_motion, fixes_pose
 from ballplate.simulator.inputs import FileRow, format_length, listing, shorten
 from ballplate.simulator.machines import Array, Integers
 
 from .heading_words import folded, quoted
-from .probe_matching import Places, matched_probes
+from .probe_matching import Places, matched_probes, nominal_places
 
 # A reading is of the ball whose place is nearer than this part of the distance to its nearest
 # neighbour; a position is the one whose readings are on average as near, and others twice as far.

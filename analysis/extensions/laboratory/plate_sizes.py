@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from ballplate.simulator.computing import lstsq
-from ballplate.simulator.design import Design, read_in_positions
+from ballplate.simulator.design import Design, Readings
 from ballplate.simulator.geometry import AXIS_NAMES, fit_motion
 from ballplate.simulator.inputs import listing
-from ballplate.simulator.machines import Array
+from ballplate.simulator.machines import Array, Integers
 
 from .length_ratios import IMPOSSIBLE
 
@@ -87,3 +89,12 @@ def _factors(nominal: Array, drawn: Array, places: Array) -> list[Array]:
     is_explained = (left**2).sum() < EXPLAINED**2 * (misfit**2).sum()
     is_square = (abs(square - np.diag(factor**2)) < AGREEMENT * np.outer(factor, factor)).all()
     return [np.where(is_explained and is_square, factor, np.nan)]
+
+
+def read_in_positions(design: Design, readings: Readings) -> Iterator[tuple[int, Integers, Array]]:
+    """Yield for each position with readings its index, the indices (m,) of its readings, and the
+    locations (m, d) of their balls in the artefact's frame.
+    """
+    for k in np.unique(readings.position).tolist():
+        rows = np.flatnonzero(readings.position == k)
+        yield k, rows, design.balls.places[readings.ball[rows]]

@@ -6,9 +6,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from ballplate.simulator.design import Design, nominal_places
+from ballplate.simulator.design import Design
 from ballplate.simulator.inputs import FileRow, listing
-from ballplate.simulator.machines import Array
+from ballplate.simulator.machines import Array, Integers
 
 from .heading_words import quoted
 
@@ -59,3 +59,9 @@ def matched_probes(
         f"the probes {quoted(unknown)} are not in the experiment, and neither the plan nor their"
         f" places tell which they are; write the names that it has: {listing(known)}"
     )
+
+
+def nominal_places(design: Design, position: int, balls: Integers) -> Array:
+    """Return nominal locations (m, d) of balls of an artefact in a position."""
+    planned = design.positions
+    return design.balls.places[balls] @ planned.rotations[position].T + planned.origins[position]

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from ballplate.cli import (
     UsageError,
-    Writer,
     add_force,
     add_json,
     add_output,
@@ -22,6 +21,7 @@ from ballplate.cli import (
 from .fitted_argument import FITTED, fitted_map
 
 if TYPE_CHECKING:
+    from ballplate.presentation import Writer
     from ballplate.simulator.design import Tasks
 
     from ..machine_files import FittedMap

@@ -8,16 +8,17 @@ from pathlib import Path
 from typing import Any
 
 from ballplate.simulator.experiment import (
+    KINDS,
     Candidate,
     Experiment,
     Pool,
     Position,
     TimesSettings,
-    is_of_machine,
 )
 from ballplate.simulator.inputs import (
     format_duration,
     in_one_line,
+    provided,
     service,
     to_list,
     to_python,
@@ -200,3 +201,9 @@ def _changed(settings: Any, steps: Sequence[str], change: Callable[[Any], Any]) 
         return settings
     keys = settings if step == EACH else settings.keys() & {step}
     return {**settings, **{key: _changed(settings[key], further, change) for key in keys}}
+
+
+def is_of_machine(kind: str) -> bool:
+    """True if items of a kind are of no artefact."""
+    settings = None if kind in KINDS else provided("calibrations", kind, "SETTINGS")
+    return settings is not None and "artefact" not in settings.model_fields

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ballplate.cli import (
-    Writer,
     add_file,
     add_force,
     add_json,
@@ -26,6 +25,8 @@ from ballplate.cli import (
 from ballplate.simulator.inputs import service
 
 if TYPE_CHECKING:
+    from ballplate.presentation import Writer
+
     from .selection import Campaign
 
 DESCRIPTION = (

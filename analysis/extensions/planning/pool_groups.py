@@ -23,10 +23,11 @@ from ballplate.simulator.experiment import (
     check_turns,
     edge_of,
     entered,
+    extent,
     length_of,
     lengths_per_axis,
     limits_of,
-    occupied,
+    outline,
     shared,
 )
 from ballplate.simulator.geometry import (
@@ -339,3 +340,11 @@ def _probes(stated: Any, steps: Steps, references: References) -> tuple[tuple[st
     for k, names in enumerate(stated):
         references.are_probes(names, (*steps, "probes", k))
     return tuple(stated)
+
+
+def occupied(pose: Pose, layout: BallLayout, edge: float | None) -> Array:
+    """Return the lowest and the highest co-ordinates (2, d) of an artefact's balls, and with an
+    `edge` of the plate.
+    """
+    balls = extent(ball_coordinates(pose, layout))
+    return balls if edge is None else extent(np.vstack([balls, outline(pose, layout, edge)]))

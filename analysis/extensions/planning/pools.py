@@ -36,7 +36,6 @@ from ballplate.simulator.experiment import (
     entered,
     is_group,
     limits_of,
-    occupied,
     resolve_calibration,
     resolve_positions,
 )
@@ -56,7 +55,7 @@ from ballplate.simulator.inputs import (
     written_text,
 )
 
-from .pool_groups import FORBIDDEN, generate
+from .pool_groups import FORBIDDEN, generate, occupied
 from .room_lengths import in_lengths
 
 SET_UP, READING, PROBE_CHANGE, PLANE_CHANGE = 20 * 60.0, 15.0, 2 * 60.0, 30 * 60.0

@@ -5,10 +5,10 @@ from __future__ import annotations
 import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ballplate.cli import (
     UsageError,
-    Writer,
     add_force,
     add_output,
     add_picture,
@@ -18,6 +18,9 @@ from ballplate.cli import (
     print_lines,
     write,
 )
+
+if TYPE_CHECKING:
+    from ballplate.presentation import Writer
 
 DESCRIPTION = (
     "Fit a cubic spline to errors along an axis or along the profile of a turned part, by least"

@@ -1,19 +1,20 @@
-"""Calibrated distances between balls of a plate, or of a length standard."""
+"""Calibrated distances between balls of a plate, or of a length standard, and radii of gauges."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
 import numpy as np
 from ballplate.simulator.geometry.ball_layouts import BallLayout
 from ballplate.simulator.inputs.quantities import LengthFunction
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers
 from numpy.typing import NDArray
 
-from ..arrays import Design, Words
+from ..arrays import Design, State, Words
 from .balls import BallObservations
-from .calibration import Calibration
+from .calibration import Calibration, CertifiedValue
 from .whitening import CovarianceRoot, at_least_exact
 
 
@@ -103,3 +104,29 @@ class DistanceCalibration(Calibration):
             standard_uncertainty=new,
             standard_uncertainties=factor * self.standard_uncertainties,
         )
+
+
+@dataclass(frozen=True, eq=False)
+class RadiusCalibration(Calibration):
+    """The calibrated radius of a Bryan gauge: ``value`` and ``standard_uncertainty`` in metres."""
+
+    artefact: str
+    value: float
+    standard_uncertainty: float
+    kind: Literal["radius"] = "radius"
+
+    @property
+    def size(self) -> int:
+        return 1
+
+    def certified_values(self, layout: BallLayout) -> Iterator[CertifiedValue]:
+        drawn = float(np.sqrt((layout.coordinates[0] ** 2).sum()))
+        yield CertifiedValue(
+            "", self.artefact, "radius", self.value, self.standard_uncertainty, drawn=drawn
+        )
+
+    def true_values(self, design: Design, truth: State, model: ErrorModel, first: int) -> Array:
+        return np.sqrt((truth.balls[first : first + 1] ** 2).sum(axis=1))
+
+    def with_values(self, values: Array) -> RadiusCalibration:
+        return replace(self, value=float(values[0]))

@@ -17,7 +17,7 @@ from ballplate.simulator.computing.numerics import svd
 from ballplate.simulator.inputs.number_arrays import Flags
 from ballplate.simulator.machines.protocol import Array, Integers
 
-from .length_arrays import LengthArrays
+from ..objects import LengthArrays
 from .whitening import Whitening, whitening
 
 # Displacements that change lengths by less than this, compared with what changes them most, count

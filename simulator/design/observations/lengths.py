@@ -13,8 +13,8 @@ from ballplate.simulator.inputs.number_arrays import Flags
 from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers
 
 from ..arrays import Design, Observations, Rows, State, locations, reading_noise
+from ..objects import LengthArrays
 from ..parameters import SharedLayout, shared_layout
-from .length_arrays import LengthArrays
 from .readings import expected_readings, offset_sensitivity
 
 if TYPE_CHECKING:

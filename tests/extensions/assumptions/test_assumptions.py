@@ -12,7 +12,7 @@ import pytest
 import yaml
 from ballplate.cli import main
 from ballplate.extensions.assumptions.effects import Assumptions
-from ballplate.simulator.readings.generate import simulated_readings
+from ballplate.simulator.readings.simulated import simulated_readings
 
 from tests.reference.random_experiments import ARRANGEMENTS, random_text
 from tests.reference.small_quickstart import small_quickstart, small_sections

@@ -13,8 +13,8 @@ from ballplate.simulator.design.arrays import nominal_state
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment, Position
-from ballplate.simulator.readings.generate import exact_readings
 from ballplate.simulator.readings.reading_files import write_readings
+from ballplate.simulator.readings.simulated import exact_readings
 
 CAMPAIGN = Path("designs/planning/campaign.yaml")
 

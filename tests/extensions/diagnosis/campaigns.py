@@ -26,8 +26,8 @@ from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
-from ballplate.simulator.readings.generate import simulated_readings
 from ballplate.simulator.readings.observed_readings import ObservedReadings, observe
+from ballplate.simulator.readings.simulated import simulated_readings
 from numpy.typing import NDArray
 
 from tests.extensions.diagnosis.designs import PLATE

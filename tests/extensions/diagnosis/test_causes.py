@@ -19,8 +19,8 @@ from ballplate.results.fitting import fit
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
-from ballplate.simulator.readings.generate import simulated_readings
 from ballplate.simulator.readings.observed_readings import observe
+from ballplate.simulator.readings.simulated import simulated_readings
 
 from tests.extensions.diagnosis.campaigns import (
     ASSUMED,

@@ -20,8 +20,9 @@ from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.machines.truth import true_machine
-from ballplate.simulator.readings.generate import noisy_certificate, noisy_readings, on_true_machine
 from ballplate.simulator.readings.observed_readings import observe
+from ballplate.simulator.readings.simulated import noisy_readings, on_true_machine
+from ballplate.simulator.readings.true_artefacts import noisy_certificate
 from numpy.typing import NDArray
 from scipy.stats import beta, binom
 

@@ -20,9 +20,9 @@ from ballplate.simulator.estimation.gauss_newton import Solution, estimate, line
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.machines.truth import true_machine
-from ballplate.simulator.readings.generate import exact_readings, on_true_machine
 from ballplate.simulator.readings.observed_readings import ObservedReadings, observe
 from ballplate.simulator.readings.reading_files import read_readings
+from ballplate.simulator.readings.simulated import exact_readings, on_true_machine
 from numpy.typing import NDArray
 from scipy.stats import chi2
 

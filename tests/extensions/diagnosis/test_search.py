@@ -19,8 +19,9 @@ from ballplate.simulator.estimation.gauss_newton import estimate, moved
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.machines.truth import true_machine
-from ballplate.simulator.readings.generate import noisy_certificate, noisy_readings, on_true_machine
 from ballplate.simulator.readings.observed_readings import observe
+from ballplate.simulator.readings.simulated import noisy_readings, on_true_machine
+from ballplate.simulator.readings.true_artefacts import noisy_certificate
 from numpy.typing import NDArray
 
 from tests.extensions.diagnosis.designs import MIXED, PLANE, experiment

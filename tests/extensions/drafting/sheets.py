@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from ballplate.simulator.experiment.construction import with_chosen
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment, Position
-from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.geometry.positions import ball_coordinates
 from ballplate.simulator.machines.protocol import Array
 

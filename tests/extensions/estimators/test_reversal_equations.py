@@ -12,7 +12,7 @@ from ballplate.extensions.estimators.reversal import (
     reverse,
     turn_between,
 )
-from ballplate.simulator.geometry.axes import PlateAxes, in_plate_axes
+from ballplate.results.plates import PlateAxes, in_plate_axes
 from ballplate.simulator.machines.metric import Scale
 from ballplate.simulator.machines.protocol import Array
 

@@ -17,7 +17,7 @@ from ballplate.simulator.design.observations.distances import CalibratedDistance
 from ballplate.simulator.geometry.ball_layouts import pairs
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.kinematic import kinematic_model
-from ballplate.simulator.readings.generate import exact_readings, noisy_readings
+from ballplate.simulator.readings.simulated import exact_readings, noisy_readings
 
 from tests.estimation.test_gauss_newton import exactly_calibrated, truth_of
 from tests.reference.designs import (

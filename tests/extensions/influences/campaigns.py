@@ -18,7 +18,7 @@ from ballplate.simulator.estimation.functions import linear_functions
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.readings.generate import scale_readings
+from ballplate.simulator.readings.simulated import scale_readings
 from ballplate.uncertainty.quantities import QUANTITIES
 from numpy.typing import NDArray
 from scipy.stats import chi2

@@ -17,8 +17,8 @@ from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.readings.generate import simulated_readings
 from ballplate.simulator.readings.reading_files import read_readings, write_readings
+from ballplate.simulator.readings.simulated import simulated_readings
 
 from tests.extensions.influences import wording
 from tests.extensions.influences.campaigns import (

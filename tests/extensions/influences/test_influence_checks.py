@@ -16,8 +16,8 @@ from ballplate.simulator.design.influence_quantities import (
     Influence,
     InfluenceParameter,
 )
-from ballplate.simulator.experiment.influence_settings import InfluenceSettings
 from ballplate.simulator.experiment.layout import lay_out
+from ballplate.simulator.experiment.sections import InfluenceSettings
 from ballplate.simulator.inputs.messages import ExperimentError
 
 

@@ -28,7 +28,7 @@ from pathlib import Path
 
 import ballplate as bp
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.readings.generate import simulated_readings
+from ballplate.simulator.readings.simulated import simulated_readings
 
 folder = Path(sys.argv[1])
 start = bp.load(folder / "base.yaml")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import yaml
 from ballplate.cli import main
-from ballplate.results.error_functions import POINTS
+from ballplate.results.residuals import POINTS
 from numpy.typing import NDArray
 
 from tests.oracle.campaigns import campaign_file, planned, random_file

@@ -30,8 +30,8 @@ from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.machines.protocol import Reported
-from ballplate.simulator.readings.generate import simulated_readings
 from ballplate.simulator.readings.observed_readings import ObservedReadings, observe
+from ballplate.simulator.readings.simulated import simulated_readings
 from numpy.typing import NDArray
 from scipy.spatial.distance import pdist
 

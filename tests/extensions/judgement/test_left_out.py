@@ -24,8 +24,9 @@ from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.machines import Integers
-from ballplate.simulator.readings.generate import noisy_certificate, noisy_readings
 from ballplate.simulator.readings.observed_readings import ObservedReadings, observe
+from ballplate.simulator.readings.simulated import noisy_readings
+from ballplate.simulator.readings.true_artefacts import noisy_certificate
 from numpy.typing import NDArray
 
 from tests.reference import dense

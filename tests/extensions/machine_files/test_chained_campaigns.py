@@ -20,8 +20,8 @@ from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.gauss_newton import moved
 from ballplate.simulator.experiment.earlier_campaigns import EarlierCampaign
 from ballplate.simulator.experiment.layout import lay_out
-from ballplate.simulator.readings.generate import Simulated, simulated_readings
 from ballplate.simulator.readings.observed_readings import ObservedReadings, observe
+from ballplate.simulator.readings.simulated import Simulated, simulated_readings
 from scipy import linalg, stats
 
 from tests.extensions.machine_files.kinds import IN_PLANE

@@ -18,7 +18,7 @@ import pandas
 import pytest
 import yaml
 from ballplate.cli import main
-from ballplate.results.lack_of_fit import LIMIT
+from ballplate.results.residuals import LIMIT
 
 from tests.extensions.machine_files import wording
 from tests.reference.small_quickstart import SMALL, small_quickstart

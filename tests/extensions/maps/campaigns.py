@@ -14,8 +14,9 @@ from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.machines.truth import true_machine
-from ballplate.simulator.readings.generate import noisy_certificate, noisy_readings, on_true_machine
 from ballplate.simulator.readings.observed_readings import observe
+from ballplate.simulator.readings.simulated import noisy_readings, on_true_machine
+from ballplate.simulator.readings.true_artefacts import noisy_certificate
 
 
 def simulated_fit(

@@ -21,7 +21,7 @@ from ballplate.extensions.maps.map_places import PlacesAsked, map_places
 from ballplate.results.fits import Fit
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.readings.generate import simulated_readings
+from ballplate.simulator.readings.simulated import simulated_readings
 from numpy.polynomial.chebyshev import cheb2poly, chebvander
 from numpy.polynomial.legendre import poly2leg
 from numpy.typing import NDArray

@@ -14,8 +14,8 @@ from ballplate.extensions.planning.constraints import Budget, Spent
 from ballplate.extensions.planning.schedule import run_sheet
 from ballplate.extensions.planning.selection import Campaign, CurvePoint, Gain
 from ballplate.results.checked_files import predict
+from ballplate.simulator.experiment.construction import with_chosen
 from ballplate.simulator.experiment.loading import load
-from ballplate.simulator.experiment.pool import with_chosen
 
 pytest.importorskip("matplotlib", reason="pictures need matplotlib")
 

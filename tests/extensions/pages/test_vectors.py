@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from ballplate.cli import main
 from ballplate.extensions.estimators.reversal_fits import fit_reversal
-from ballplate.presentation.vectors import LONGEST, Vectors, draw_vectors, magnification
+from ballplate.presentation.scenes import LONGEST, Vectors, draw_vectors, magnification
 from ballplate.results.fitting import fit
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load

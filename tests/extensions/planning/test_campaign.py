@@ -20,7 +20,7 @@ from ballplate.extensions.planning.remaining_candidates import offer
 from ballplate.extensions.planning.search import SelectionProblem
 from ballplate.presentation import percent
 from ballplate.results.checked_files import predict
-from ballplate.simulator.computing.failures import InternalError
+from ballplate.simulator.computing.steps import InternalError
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError

@@ -14,10 +14,10 @@ from ballplate.extensions.campaign.sheet import sheet_of
 from ballplate.extensions.planning.experiment_file import experiment_text
 from ballplate.extensions.planning.schedule import run_sheet
 from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.experiment.construction import with_chosen
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Candidate, Experiment, Position
-from ballplate.simulator.experiment.pool import with_chosen
 
 from tests.extensions.own_models.test_custom_model import GOOD
 from tests.reference.copies import copy_file

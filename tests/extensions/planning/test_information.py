@@ -18,10 +18,10 @@ from ballplate.results.checked_files import predict
 from ballplate.results.prediction import Prediction
 from ballplate.simulator.estimation.functions import displacements
 from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.experiment.construction import with_chosen
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment, Position
-from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.uncertainty.pairs import pairs_of
 from ballplate.uncertainty.quantities import functions_of

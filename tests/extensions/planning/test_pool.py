@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 from ballplate.results.checked_files import check
+from ballplate.simulator.experiment.construction import placed_only
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import AtMost, Candidate, Experiment, Pool, Position
-from ballplate.simulator.experiment.pool import placed_only
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.quantities import parse_length
 from ballplate.simulator.inputs.units import length_text

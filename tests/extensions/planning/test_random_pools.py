@@ -20,10 +20,10 @@ from ballplate.extensions.planning.schedule import run_sheet
 from ballplate.extensions.planning.selection import Campaign
 from ballplate.results.checked_files import planned_uncertainty, predict
 from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.experiment.construction import with_chosen
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Candidate, Experiment, Position
-from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.readings.reading_files import read_readings
 

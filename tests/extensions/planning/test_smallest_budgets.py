@@ -17,10 +17,10 @@ from ballplate.extensions.planning.criteria import CriterionName, criterion, is_
 from ballplate.extensions.planning.information import pool_information
 from ballplate.extensions.planning.search import LARGE, Losses, SelectionProblem, full_root, value
 from ballplate.simulator.estimation.linearisation import linearise
+from ballplate.simulator.experiment.construction import with_chosen
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Candidate, Experiment, Position
-from ballplate.simulator.experiment.pool import with_chosen
 from ballplate.simulator.inputs.messages import ExperimentError
 
 from tests.extensions.planning import wording

@@ -1,0 +1,149 @@
+"""Readings of an experiment's true machine."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from ballplate.simulator.design.arrays import (
+    Design,
+    Readings,
+    State,
+    in_sequence,
+    influence_shifts,
+    locations,
+    nominal_state,
+    reading_uncertainties,
+)
+from ballplate.simulator.experiment.layout import lay_out
+from ballplate.simulator.experiment.model import Experiment
+from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.machines.protocol import Array, ErrorModel
+from ballplate.simulator.machines.truth import TrueMachine, true_machine
+
+
+class NoReadingError(ValueError):
+    """The true machine's errors are so large that no scale reading belongs to some location."""
+
+
+def on_true_machine(design: Design, machine: TrueMachine) -> tuple[Design, State]:
+    """Return the nominal design on the true machine, whose error model may be another."""
+    return replace(design, model=machine.model), replace(nominal_state(design), a=machine.a)
+
+
+def scale_readings(model: ErrorModel, true: Array, a: Array, p: Array) -> Array:
+    """Return scale readings x (m, d) with x + e(x, a, p) = `true`, exact to rounding.
+
+    :raises NoReadingError: the errors are too large for the iteration x <- true - e(x) to settle.
+    """
+    x = true - p
+    rounding = 4e-16 * max(1.0, float(np.abs(true).max(initial=0.0)))
+    with np.errstate(over="ignore", invalid="ignore"):
+        for _ in range(100):
+            change = true - x - model.error(x, a, p)
+            x = x + change
+            largest = float(np.abs(change).max(initial=0.0))
+            if largest <= rounding:
+                return x
+    if not largest <= 10 * rounding:
+        raise NoReadingError(
+            "the errors of the true machine are too large for its readings to be found"
+        )
+    return x
+
+
+def true_readings(
+    design: Design, truth: State, readings: Readings, model: ErrorModel | None = None
+) -> Array:
+    """Return scale readings (m, d) without noise, of a true machine, whose error model is by
+    default the design's.
+
+    :raises NoReadingError: as `scale_readings`.
+    """
+    model = model or design.model
+    p, true = truth.probes[readings.probe], locations(design, truth, readings)
+    x = scale_readings(model, true, truth.a, p)
+    # Scale readings determine at most a ten-thousandth of the shift: five passes reach rounding.
+    for _ in range(5 if design.influences else 0):
+        shift, _ = influence_shifts(design, truth, readings, x)
+        x = scale_readings(model, true + shift, truth.a, p)
+    return x
+
+
+def exact_readings(design: Design, truth: State) -> tuple[Readings, Array]:
+    """Return readings of a design, one row per repeat, without noise: (rows, d) metres."""
+    readings = in_sequence(design.readings.expanded(), design.influences)
+    return readings, true_readings(design, truth, readings)
+
+
+def noisy_readings(
+    design: Design, truth: State, generator: np.random.Generator
+) -> tuple[Readings, Array]:
+    """Return `exact_readings` with noise of the readings' standard uncertainties."""
+    readings, x = exact_readings(design, truth)
+    noise = design.noise.draw(generator, x.shape, readings.position, 0)
+    return readings, x + noise * reading_uncertainties(design, readings)
+
+
+def true_influences(design: Design, generator: np.random.Generator) -> Array:
+    """Draw true values (p,) of influence quantities about the stated ones; unknown ones keep their
+    stated values.
+    """
+    u = np.array([parameter.uncertainty for parameter in design.influence_parameters], float)
+    errors = np.where(np.isfinite(u), u, 0.0) * generator.standard_normal(len(u))
+    return design.influence_values + errors
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """Scale readings `x` (readings, d) in metres of the true artefacts on the true machine, `truth`
+    on `model`.
+
+    `generator` continues after the readings; None without noise.
+    """
+
+    design: Design
+    truth: State
+    model: ErrorModel
+    readings: Readings
+    x: Array
+    seed: int
+    generator: np.random.Generator | None
+
+
+def on_stated_machine(experiment: Experiment, design: Design) -> tuple[Design, State]:
+    """Return an experiment's nominal design on the true machine that its file states."""
+    machine = true_machine(experiment.true_machine, design.model, *design.machine.volume.corners)
+    return on_true_machine(design, machine)
+
+
+def too_large(experiment: Experiment, error: Exception) -> ExperimentError:
+    """Return the error of a true machine whose errors prevent readings or a fit."""
+    return experiment.refused(("true_machine",), f"{error}; state smaller ones")
+
+
+def simulated_readings(
+    experiment: Experiment, seed: int | None = None, exact: bool = False
+) -> Simulated:
+    """Return noisy readings of the true machine, of artefacts that differ from their certificates.
+
+    `seed` replaces that of the experiment. `exact` omits all noise and uses nominal artefacts.
+
+    :raises ExperimentError: the true machine's errors are too large for a reading to exist.
+    """
+    design = lay_out(experiment)
+    on_truth, truth = on_stated_machine(experiment, design)
+    chosen = experiment.seed if seed is None else seed
+    generator = None if exact else np.random.default_rng(np.random.SeedSequence(chosen))
+    try:
+        if generator is None:
+            readings, x = exact_readings(on_truth, truth)
+        else:
+            from .true_artefacts import true_artefacts
+
+            balls = true_artefacts(design, generator)
+            truth = replace(truth, balls=balls, influences=true_influences(design, generator))
+            readings, x = noisy_readings(on_truth, truth, generator)
+    except NoReadingError as error:
+        raise too_large(experiment, error) from None
+    return Simulated(design, truth, on_truth.model, readings, x, chosen, generator)
