@@ -193,7 +193,9 @@ def _can_be_tied(balls: int, steps: Steps, references: References) -> bool:
         f"distances tie {balls} balls together, at most {MOST_TIED_BALLS} are possible; "
         "calibrate fewer distances, such as corner sides, or co-ordinates"
     )
-    return references.require(balls <= MOST_TIED_BALLS, steps, text)
+    if balls > MOST_TIED_BALLS:
+        references.problems.add(steps, text)
+    return balls <= MOST_TIED_BALLS
 
 
 def _pairs(
@@ -202,6 +204,7 @@ def _pairs(
     steps: Steps,
     references: References,
 ) -> NDArray[np.intp] | None:
+    problems = references.problems
     if isinstance(selection, str):
         # Pairs of all these balls would fill the memory before they can be refused.
         if selection == "all" and not _can_be_tied(len(layout.names), steps, references):
@@ -209,29 +212,31 @@ def _pairs(
         try:
             pair_list = pairs(layout, selection)
         except ValueError as error:
-            references.problems.add(steps, str(error))
+            problems.add(steps, str(error))
             return None
-        if not references.require(
-            len(pair_list) > 0, steps, "the artefact has a single ball and no pairs; remove it"
-        ):
+        if not len(pair_list):
+            problems.add(steps, "the artefact has a single ball and no pairs; remove it")
             return None
         return pair_list
     index = {name: i for i, name in enumerate(layout.names)}
     pairs_seen: dict[frozenset[str], int] = {}
-    is_right = True
+    before = len(problems.messages)
     for i, names in enumerate(selection):
         for j, name in enumerate(names):
-            text = f'unknown ball "{name}"; {hint(name, layout.names) if name not in index else ""}'
-            is_right &= references.require(name in index, (*steps, i, j), text)
-        text = f'a ball has no distance from itself; name two balls, not "{names[0]}" twice'
-        is_right &= references.require(names[0] != names[1], (*steps, i), text)
+            if name not in index:
+                text = f'unknown ball "{name}"; {hint(name, layout.names)}'
+                problems.add((*steps, i, j), text)
+        if names[0] == names[1]:
+            text = f'a ball has no distance from itself; name two balls, not "{names[0]}" twice'
+            problems.add((*steps, i), text)
         pair = frozenset(names)
-        text = f"is already in entry [{pairs_seen.get(pair)}]; remove one of the two"
-        is_right &= references.require(pair not in pairs_seen, (*steps, i), text)
+        if pair in pairs_seen:
+            text = f"is already in entry [{pairs_seen[pair]}]; remove one of the two"
+            problems.add((*steps, i), text)
         pairs_seen.setdefault(pair, i)
-    return (
-        np.array([[index[a], index[b]] for a, b in selection], dtype=np.intp) if is_right else None
-    )
+    if len(problems.messages) > before:
+        return None
+    return np.array([[index[a], index[b]] for a, b in selection], dtype=np.intp)
 
 
 def _certified_distances(
