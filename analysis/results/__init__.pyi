@@ -23,7 +23,9 @@ from .checked_files import (
 from .estimates import (
     ESTIMATE_COLUMNS as ESTIMATE_COLUMNS,
     ParameterEstimate as ParameterEstimate,
+    ensure_points as ensure_points,
     labels as labels,
+    probe_places as probe_places,
 )
 from .estimator_choice import COMPARED as COMPARED, EstimatorName as EstimatorName
 from .extension_results import has_exact_values as has_exact_values

@@ -15,14 +15,15 @@ from ballplate.presentation.table_columns import MainTable
 from ballplate.simulator.inputs.arguments import ensure_positive, ensure_type
 from ballplate.simulator.inputs.extensions import function, service
 from ballplate.simulator.machines.protocol import Array
-from ballplate.simulator.readings.given_points import ensure_points, probe_places
 
 from .estimates import (
     ESTIMATE_COLUMNS,
     CorrectedPoints,
     ParameterEstimate,
     correct,
+    ensure_points,
     labels,
+    probe_places,
 )
 from .extension_results import (
     IssuedCertificate,

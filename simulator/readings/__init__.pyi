@@ -1,5 +1,4 @@
 # Public names of this package, each loaded from its module when it is first used.
-from .given_points import ensure_points as ensure_points, probe_places as probe_places
 from .joining import joined as joined
 from .observed_readings import ObservedReadings as ObservedReadings, observe as observe
 from .reading_files import AXES as AXES, read_readings as read_readings

@@ -214,7 +214,7 @@ def correct(
     '0.080 µm'
     """
     import pandas
-    from ballplate.simulator.readings import ensure_points, probe_places
+    from ballplate.results import ensure_points, probe_places
 
     from .correction import correction
     from .point_files import GivenPoints, read_points

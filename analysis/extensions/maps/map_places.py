@@ -9,11 +9,11 @@ from typing import Literal
 
 import numpy as np
 from ballplate.presentation import picked
+from ballplate.results import ensure_points
 from ballplate.simulator.design import Volume
 from ballplate.simulator.geometry import AXIS_NAMES, even_grid
 from ballplate.simulator.inputs import GivenText, header_names, parse_length, refused
 from ballplate.simulator.machines import Array, Integers
-from ballplate.simulator.readings import ensure_points
 
 from ..machine_files import parse_line, parse_point
 from .point_files import PROBE, read_points
