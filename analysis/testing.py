@@ -9,15 +9,14 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from ballplate.simulator.design.arrays import (
-    Design,
-    Observations,
+from ballplate.simulator.design.arrays import Design, Observations
+from ballplate.simulator.design.influence_quantities import Influence
+from ballplate.simulator.design.measurement import (
     disturbed_readings,
     in_sequence,
     locations,
     nominal_state,
 )
-from ballplate.simulator.design.influence_quantities import Influence
 from ballplate.simulator.design.observations.balls import BallFunctions
 from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.gauss_newton import moved

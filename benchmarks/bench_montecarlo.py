@@ -29,9 +29,10 @@ from ballplate.montecarlo.experiments import TASK, run_trials, sum_of_task
 from ballplate.montecarlo.reference import Reference, Truth, reference
 from ballplate.montecarlo.replicates import BATCH, draw, estimate_batch
 from ballplate.montecarlo.targets import targets
-from ballplate.simulator.design.arrays import State, nominal_state
+from ballplate.simulator.design.measurement import nominal_state
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.design.observations.readings import reading_blocks
+from ballplate.simulator.design.state import State
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from ballplate.simulator.machines.protocol import Array
 from joblib import Parallel, delayed

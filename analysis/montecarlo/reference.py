@@ -6,9 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from ballplate.simulator.computing.processes import single_threaded
-from ballplate.simulator.design.arrays import Design, Rows, State, reading_noise
+from ballplate.simulator.design.arrays import Design, Rows
+from ballplate.simulator.design.measurement import reading_noise
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.design.observations.readings import reading_blocks, reading_weights
+from ballplate.simulator.design.state import State
 from ballplate.simulator.estimation.covariance import Spectrum
 from ballplate.simulator.estimation.elimination import Factor
 from ballplate.simulator.estimation.gauss_newton import Solution, iterate

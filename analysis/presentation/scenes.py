@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design, locations, nominal_state
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.measurement import locations, nominal_state
 from ballplate.simulator.inputs.number_arrays import Flags
 from ballplate.simulator.machines.protocol import Array
 

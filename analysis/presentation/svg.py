@@ -7,6 +7,7 @@ import math
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -91,17 +92,35 @@ def drawing(height: float, width: float = WIDTH) -> Iterator[Figure]:
             "pictures need matplotlib; install it with: python -m pip install 'ballplate[report]'"
         )
         raise ImportError(text, name="matplotlib") from error
-    from .figures import Picture
-
     # A user's own settings must not change the page.
     with matplotlib.rc_context(), warnings.catch_warnings():
         matplotlib.rcdefaults()
         matplotlib.rcParams.update(SETTINGS)
         # Letters that the measuring font lacks are drawn by the reader's.
         warnings.filterwarnings("ignore", message="Glyph .* missing")
-        figure = Picture(figsize=(width / 72.0, height / 72.0), facecolor="none")
+        figure = _picture()(figsize=(width / 72.0, height / 72.0), facecolor="none")
         figure.settings = SETTINGS
         yield figure
+
+
+@cache
+def _picture() -> Any:
+    """The class of figures that show themselves in a notebook with their own `settings`; their
+    label is the alternative text.
+    """
+    import matplotlib
+    from matplotlib.figure import Figure
+
+    class Picture(Figure):
+        settings: Any
+
+        def _repr_png_(self) -> bytes:
+            stream = io.BytesIO()
+            with matplotlib.rc_context(self.settings):
+                self.savefig(stream, format="png", facecolor="white", dpi=144)
+            return stream.getvalue()
+
+    return Picture
 
 
 def placed_axes(figure: Figure, left: float, bottom: float, width: float, height: float) -> Axes:

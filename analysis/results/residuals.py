@@ -11,7 +11,8 @@ import numpy as np
 from ballplate.presentation.formatting import Data, as_data
 from ballplate.simulator.computing.numerics import comparable
 from ballplate.simulator.computing.processes import single_threaded
-from ballplate.simulator.design.arrays import Design, Readings, measured, reading_noise
+from ballplate.simulator.design.arrays import Design, Readings, measured
+from ballplate.simulator.design.measurement import reading_noise
 from ballplate.simulator.design.observations.lengths import Lengths, length_deviations
 from ballplate.simulator.design.observations.readings import reading_blocks
 from ballplate.simulator.estimation.gauss_newton import Solution

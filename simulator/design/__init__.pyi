@@ -3,13 +3,7 @@ from .arrays import (
     Design as Design,
     Observations as Observations,
     Rows as Rows,
-    State as State,
-    disturbed_readings as disturbed_readings,
-    locations as locations,
     measured as measured,
-    nominal_state as nominal_state,
-    reading_noise as reading_noise,
-    reading_uncertainties as reading_uncertainties,
 )
 from .influence_quantities import (
     DesignParts as DesignParts,
@@ -17,6 +11,13 @@ from .influence_quantities import (
     Influence as Influence,
     InfluenceParameter as InfluenceParameter,
     or_unknown as or_unknown,
+)
+from .measurement import (
+    disturbed_readings as disturbed_readings,
+    locations as locations,
+    nominal_state as nominal_state,
+    reading_noise as reading_noise,
+    reading_uncertainties as reading_uncertainties,
 )
 from .objects import (
     SLIGHTLY as SLIGHTLY,
@@ -73,3 +74,4 @@ from .observations.whitening import (
     covariance_root as covariance_root,
 )
 from .parameters import SharedLayout as SharedLayout, shared_layout as shared_layout
+from .state import State as State

@@ -4,32 +4,31 @@ units.
 
 from __future__ import annotations
 
-import traceback
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, Self, TypeVar, cast
 
 import numpy as np
-from ballplate.simulator.inputs.extensions import UnusableError
 from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers, Unit
 
-from .influence_quantities import DesignParts, Disturbed, Influence, InfluenceParameter
-from .noise import Noise
+from .influence_quantities import DesignParts, Influence, InfluenceParameter
 from .objects import (
     Artefacts,
     Balls,
     EvaluationPoints,
     Flags,
     Machine,
+    Noise,
     Positions,
     Probes,
     Readings as Readings,
     Tasks,
     UnknownLengths,
 )
+from .state import Replicates, State
 
 Made = TypeVar("Made")
 Kind = TypeVar("Kind", bound="Observations")
@@ -177,30 +176,6 @@ class Design:
         return self.balls.label(ball, self.artefacts.names)
 
 
-@dataclass(frozen=True)
-class State:
-    """Values of all parameters: `balls` (n, d), `rotations` (k, d, d), `origins` (k, d), `a`
-    (parameters,), offsets of the `probes` (l, d), unknown `lengths` and `influences` (p,).
-    """
-
-    balls: Array
-    rotations: Array
-    origins: Array
-    a: Array
-    probes: Array
-    lengths: Array
-    influences: Array = field(default_factory=lambda: np.zeros(0))
-
-
-def reading_uncertainties(design: Design, readings: Readings) -> Array:
-    """Standard uncertainties (m, d) of each co-ordinate of a single one of each reading's repeats,
-    in metres.
-    """
-    if readings.uncertainty is not None:
-        return readings.uncertainty
-    return np.broadcast_to(design.machine.repeatability, (len(readings), design.dimension))
-
-
 def measured(design: Design, readings: Readings) -> Flags:
     """Return a mask (m, d) of the co-ordinates read: all except those across artefacts that are
     read in their plane.
@@ -209,110 +184,6 @@ def measured(design: Design, readings: Readings) -> Flags:
     if design.positions.across is None:
         return np.broadcast_to(True, shape)
     return np.arange(shape[1]) != design.positions.across[readings.position][:, None]
-
-
-def reading_noise(design: Design, readings: Readings) -> Array:
-    """Standard uncertainties (m, d) of the mean of each reading's repeats, in metres."""
-    times = np.sqrt(readings.repeats)[:, None]
-    return reading_uncertainties(design, readings) / times
-
-
-def nominal_state(design: Design) -> State:
-    """The design nominal, on a machine without errors."""
-    return State(
-        design.balls.places,
-        design.positions.rotations,
-        design.positions.origins,
-        np.zeros(len(design.model.parameters)),
-        design.probes.offsets,
-        design.unknown_lengths.drawn,
-        design.influence_values,
-    )
-
-
-def locations(design: Design, state: State, readings: Readings) -> Array:
-    """True positions (m, d) of the balls that are read, T(y, t) in metres."""
-    turned = np.einsum("mij,mj->mi", state.rotations[readings.position], state.balls[readings.ball])
-    return turned + state.origins[readings.position]
-
-
-class UnmatchedReadingsError(ValueError):
-    """Scale readings that are not those of the readings they are joined to."""
-
-
-def ensure_rows(design: Design, readings: Readings, x: Array) -> None:
-    """Refuse scale readings without one row (d,) for each reading, and readings of balls that are
-    not in their positions.
-
-    :raises UnmatchedReadingsError: there are some.
-    """
-    if x.shape != (len(readings), design.dimension):
-        raise UnmatchedReadingsError("there is not one scale reading for each reading")
-    of_ball, of_position = design.balls.artefact, design.positions.artefact
-    if (of_ball[readings.ball] != of_position[readings.position]).any():
-        raise UnmatchedReadingsError("readings of balls that are not in their positions")
-
-
-def in_sequence(readings: Readings, influences: tuple[Influence, ...]) -> Readings:
-    """Return all readings in the order of reading, with the further columns that influence
-    quantities need.
-    """
-    if not influences:
-        return readings
-    order = np.arange(len(readings), dtype=float)
-    ordered = replace(readings, beside={**(readings.beside or {}), "order": order})
-    for influence in influences:
-        ordered = replace(
-            ordered, beside={**(ordered.beside or {}), **influence.in_sequence(ordered)}
-        )
-    return ordered
-
-
-def disturbed_readings(state: State, readings: Readings, x: Array) -> Disturbed:
-    """Readings where the scales say `x` (m, d), in metres, as influence quantities see them."""
-    return Disturbed(
-        readings.ball,
-        readings.position,
-        readings.probe,
-        x,
-        state.balls[readings.ball],
-        state.rotations[readings.position],
-        state.probes[readings.probe],
-        readings.beside or {},
-    )
-
-
-def influence_shifts(
-    design: Design, state: State, readings: Readings, x: Array
-) -> tuple[Array, Array]:
-    """Return the effect of influence quantities on the locations of readings (m, d), and its
-    derivative by their parameters (m, d, p), at scale readings `x` (m, d); metres.
-    """
-    disturbed = disturbed_readings(state, readings, x)
-    shift, parts = np.zeros(x.shape), [np.zeros((*x.shape, 0))]
-    for influence in design.influences:
-        try:
-            shifts, derivative = influence.shifts(disturbed)
-        except MemoryError:
-            raise
-        except Exception as error:
-            from ballplate.simulator.inputs.own_code import error_text, own_frame
-
-            frames = traceback.extract_tb(error.__traceback__)
-            user_frame = own_frame(error) or next(
-                (f for f in frames[::-1] if f.name == "shifts"), None
-            )
-            text = (
-                f"shifts of {type(influence).__name__} has failed: {error_text(error, user_frame)}"
-            )
-            raise UnusableError(text) from error
-        shift += shifts
-        varies = np.array(
-            [parameter.uncertainty != 0.0 for parameter in influence.parameters], bool
-        )
-        parts.append(derivative[:, :, varies])
-    by_parameter = np.concatenate(parts, axis=2)
-    return shift + by_parameter @ (state.influences - design.influence_values), by_parameter
 
 
 @dataclass(frozen=True)
@@ -478,31 +349,3 @@ class Observations(ABC):
         if rows.by_shared is not None:
             at.by_shared[:] += residual @ rows.by_shared
         at.pull(self.balls, residual[:, :, None, None] * rows.by_ball)
-
-
-@dataclass(frozen=True)
-class Replicates:
-    """Differences of b replicates from the estimate `start` of readings without noise, which are
-    of the `truth`.
-
-    `balls` (b, d, n) and `shared` (b, s) are the sums of their steps. Observations add to their
-    S^2, `squares` (b,), and to half its gradient, `by_ball` (b, d, n) and `by_shared` (b, s).
-    `offsets` (l, d) are the columns of probe offsets, -1 for held ones.
-    """
-
-    start: State
-    truth: State
-    balls: Array
-    shared: Array
-    squares: Array
-    by_ball: Array
-    by_shared: Array
-    offsets: Integers
-
-    def pull(self, balls: Integers, forces: Array) -> None:
-        """Add forces (b, m, k, d) on the `balls` (m, k) of observations to the gradient."""
-        for ball, force in zip(balls.T, forces.transpose(2, 1, 0, 3), strict=True):
-            # A ball may take part in several.
-            order = np.argsort(ball, kind="stable")
-            pulled, start = np.unique(ball[order], return_index=True)
-            self.by_ball[:, :, pulled] += np.add.reduceat(force[order], start).transpose(1, 2, 0)

@@ -21,9 +21,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from ballplate.simulator.computing.processes import scipy_linalg, single_threaded
-from ballplate.simulator.design.arrays import Design, Rows, State, ensure_rows
+from ballplate.simulator.design.arrays import Design, Rows
+from ballplate.simulator.design.measurement import ensure_rows
 from ballplate.simulator.design.observations.readings import reading_blocks, reading_weights
 from ballplate.simulator.design.parameters import SharedLayout
+from ballplate.simulator.design.state import State
 from ballplate.simulator.machines.protocol import Array, Integers
 
 # Rows handled at once: enough for the matrix products to be efficient, few enough to stay in cache.

@@ -12,8 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from ballplate.simulator.computing.numerics import blank
-from ballplate.simulator.design.arrays import Design, State
+from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.parameters import SharedLayout
+from ballplate.simulator.design.state import State
 from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.quantities import Target
 from ballplate.simulator.machines.protocol import Array, Integers, Unit

@@ -7,10 +7,11 @@ from typing import Literal
 
 import numpy as np
 from ballplate.simulator.computing.processes import scipy_linalg, single_threaded
-from ballplate.simulator.design.arrays import Design, State
+from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.design.observations.readings import offset_sensitivity
 from ballplate.simulator.design.parameters import SharedLayout, shared_layout
+from ballplate.simulator.design.state import State
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from ballplate.simulator.machines.protocol import Array, Integers
 

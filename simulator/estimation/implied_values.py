@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from ballplate.simulator.computing.numerics import eigvalsh
-from ballplate.simulator.design.arrays import Design, State
+from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.balls import BallObservations, slopes_apart
+from ballplate.simulator.design.state import State
 from ballplate.simulator.machines.protocol import Array
 
 if TYPE_CHECKING:

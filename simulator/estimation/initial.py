@@ -11,9 +11,11 @@ from dataclasses import replace
 
 import numpy as np
 from ballplate.simulator.computing.numerics import comparable, lstsq, svd
-from ballplate.simulator.design.arrays import Design, State, nominal_state
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.measurement import nominal_state
 from ballplate.simulator.design.objects import Flags
 from ballplate.simulator.design.observations.readings import seen_places
+from ballplate.simulator.design.state import State
 from ballplate.simulator.geometry.motions import (
     fit_motion,
     fit_sphere,

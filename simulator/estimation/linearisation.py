@@ -8,8 +8,10 @@ from functools import cached_property
 import numpy as np
 from ballplate.simulator.computing.numerics import blank
 from ballplate.simulator.computing.processes import single_threaded
-from ballplate.simulator.design.arrays import Design, State, nominal_state
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.measurement import nominal_state
 from ballplate.simulator.design.parameters import SharedLayout, shared_layout
+from ballplate.simulator.design.state import State
 from ballplate.simulator.machines.protocol import Array, Integers
 
 from .covariance import MICROMETRE, BallCovariance, Spectrum, ball_covariance, in_order, spectrum

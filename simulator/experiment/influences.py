@@ -6,18 +6,18 @@ from collections import Counter
 from dataclasses import replace
 
 import numpy as np
-from ballplate.simulator.design.arrays import (
-    Design,
-    disturbed_readings,
-    in_sequence,
-    locations,
-    nominal_state,
-)
+from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.influence_quantities import (
     InfluenceParameter,
     few,
     wrong_of_parameters,
     wrong_of_shifts,
+)
+from ballplate.simulator.design.measurement import (
+    disturbed_readings,
+    in_sequence,
+    locations,
+    nominal_state,
 )
 from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.inputs.messages import ExperimentError

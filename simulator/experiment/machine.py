@@ -9,8 +9,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.design.noise import Noise, NoiseSettings
-from ballplate.simulator.design.objects import Machine, Volume
+from ballplate.simulator.design.objects import Machine, Noise, NoiseSettings, Volume
 from ballplate.simulator.geometry.ball_layouts import frozen
 from ballplate.simulator.inputs.messages import ExperimentError, Steps
 from ballplate.simulator.inputs.number_arrays import Array

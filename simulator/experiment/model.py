@@ -10,8 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from ballplate.simulator.design.noise import Noise
-from ballplate.simulator.design.objects import Machine
+from ballplate.simulator.design.objects import Machine, Noise
 from ballplate.simulator.design.observations.calibration import Calibration
 from ballplate.simulator.geometry.ball_layouts import ArtefactSettings, BallLayout
 from ballplate.simulator.geometry.positions import Pose

@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ballplate.simulator.design.noise import Noise
-from ballplate.simulator.design.objects import Machine
+from ballplate.simulator.design.objects import Machine, Noise
 from ballplate.simulator.design.observations.calibration import Calibration
 from ballplate.simulator.inputs.extensions import service
 from ballplate.simulator.inputs.messages import Steps

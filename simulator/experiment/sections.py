@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 from ballplate.simulator.design.influence_quantities import DesignParts, Influence
-from ballplate.simulator.design.noise import Distribution, NoiseSettings
+from ballplate.simulator.design.objects import Distribution, NoiseSettings
 from ballplate.simulator.geometry.artefacts import ARTEFACTS, AnyArtefactSettings
 from ballplate.simulator.geometry.ball_layouts import Coordinates
 from ballplate.simulator.inputs.messages import Steps

@@ -6,12 +6,8 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator
 
 import numpy as np
-from ballplate.simulator.design.arrays import (
-    Design,
-    Readings,
-    UnmatchedReadingsError,
-    ensure_rows,
-)
+from ballplate.simulator.design.arrays import Design, Readings
+from ballplate.simulator.design.measurement import UnmatchedReadingsError, ensure_rows
 from ballplate.simulator.machines.protocol import Array, Integers
 
 # Indices of the position, the ball and the probe of a reading.

@@ -7,12 +7,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.design.arrays import (
-    Design,
-    Readings,
-    ensure_rows,
-    in_sequence,
-)
+from ballplate.simulator.design.arrays import Design, Readings
+from ballplate.simulator.design.measurement import ensure_rows, in_sequence
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.geometry.motions import fit_sphere
 from ballplate.simulator.inputs.extensions import MissingExtensionError, service

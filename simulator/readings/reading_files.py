@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any, TextIO
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design, Readings, in_sequence, measured, nominal_state
+from ballplate.simulator.design.arrays import Design, Readings, measured
+from ballplate.simulator.design.measurement import in_sequence, nominal_state
 from ballplate.simulator.design.observations.readings import expected_readings
 from ballplate.simulator.experiment.readings_section import ReadingsSettings, no_settings
 from ballplate.simulator.inputs.extensions import optional_service, service

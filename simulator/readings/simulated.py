@@ -5,16 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from ballplate.simulator.design.arrays import (
-    Design,
-    Readings,
-    State,
+from ballplate.simulator.design.arrays import Design, Readings
+from ballplate.simulator.design.measurement import (
     in_sequence,
     influence_shifts,
     locations,
     nominal_state,
     reading_uncertainties,
 )
+from ballplate.simulator.design.state import State
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError

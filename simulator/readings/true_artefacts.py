@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 from ballplate.simulator.computing.numerics import lstsq
-from ballplate.simulator.design.arrays import (
-    Design,
-    State,
-    nominal_state,
-)
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.measurement import nominal_state
 from ballplate.simulator.design.observations.balls import slopes_apart
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.design.observations.whitening import at_least_exact
+from ballplate.simulator.design.state import State
 from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers
 
 

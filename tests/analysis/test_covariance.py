@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from ballplate.results.estimates import EstimatedFunctions, correct, estimated_functions
 from ballplate.results.fits import Fit
-from ballplate.simulator.design.arrays import Design, State
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.state import State
 from ballplate.simulator.estimation.gauss_newton import moved
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.experiment.layout import lay_out

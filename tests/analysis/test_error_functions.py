@@ -5,7 +5,7 @@ from __future__ import annotations
 import ballplate as bp
 import numpy as np
 import pytest
-from ballplate.simulator.design.arrays import locations
+from ballplate.simulator.design.measurement import locations
 from ballplate.simulator.estimation.gauss_newton import corrected_points
 
 SQUARE = "designs/park/plate.yaml"

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from ballplate.cli import main
 from ballplate.results.checked_files import check, predict
-from ballplate.simulator.design.arrays import nominal_state
+from ballplate.simulator.design.measurement import nominal_state
 from ballplate.simulator.design.objects import Volume
 from ballplate.simulator.estimation.functions import Distances, MeasuredPoints, linear_functions
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise

@@ -11,7 +11,7 @@ from ballplate.results.checked_files import predict
 from ballplate.results.fits import Fit
 from ballplate.results.fitting import fit
 from ballplate.results.prediction import Prediction
-from ballplate.simulator.design.arrays import State
+from ballplate.simulator.design.state import State
 from ballplate.simulator.estimation.gauss_newton import linearised_fit
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment

@@ -7,12 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ballplate.simulator.design.arrays import Design, Readings, State, nominal_state
+from ballplate.simulator.design.arrays import Design, Readings
+from ballplate.simulator.design.measurement import nominal_state
 from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.design.observations.readings import expected_readings
 from ballplate.simulator.design.parameters import shared_layout
+from ballplate.simulator.design.state import State
 from ballplate.simulator.estimation.functions import Displacements, displacements, linear_functions
 from ballplate.simulator.estimation.gauss_newton import newton_step
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise

@@ -13,9 +13,11 @@ import yaml
 from ballplate.extensions.estimators.length_equations import LengthEstimator, length_estimate
 from ballplate.results.checked_files import predict
 from ballplate.results.fitting import fit
-from ballplate.simulator.design.arrays import Design, State, nominal_state
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.measurement import nominal_state
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.design.parameters import shared_layout
+from ballplate.simulator.design.state import State
 from ballplate.simulator.estimation.gauss_newton import moved
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 import yaml
 from ballplate.results.checked_files import predict
-from ballplate.simulator.design.arrays import Design, nominal_state
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.measurement import nominal_state
 from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
 from ballplate.simulator.design.observations.readings import reading_blocks
 from ballplate.simulator.experiment.layout import lay_out

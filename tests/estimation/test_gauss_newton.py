@@ -8,9 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ballplate.simulator.design.arrays import Design, State
+from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
 from ballplate.simulator.design.observations.distances import CalibratedDistances
+from ballplate.simulator.design.state import State
 from ballplate.simulator.estimation.gauss_newton import (
     GaussNewtonSettings,
     as_drawn,

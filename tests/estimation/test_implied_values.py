@@ -7,7 +7,8 @@ from pathlib import Path
 import ballplate as bp
 import numpy as np
 import pytest
-from ballplate.simulator.design.arrays import Design, nominal_state
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.measurement import nominal_state
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.estimation.implied_values import implied_count
 from ballplate.simulator.experiment.layout import lay_out

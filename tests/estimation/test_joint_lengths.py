@@ -20,10 +20,12 @@ from ballplate.extensions.estimators.alternative_estimators import (
 from ballplate.extensions.estimators.length_equations import length_estimate
 from ballplate.montecarlo.experiments import trials
 from ballplate.results.checked_files import predict
-from ballplate.simulator.design.arrays import Design, State, nominal_state
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.measurement import nominal_state
 from ballplate.simulator.design.observations.lengths import Lengths, length_whitening
 from ballplate.simulator.design.observations.readings import expected_readings
 from ballplate.simulator.design.parameters import shared_layout
+from ballplate.simulator.design.state import State
 from ballplate.simulator.estimation.covariance import spectrum
 from ballplate.simulator.estimation.elimination import eliminate
 from ballplate.simulator.estimation.gauss_newton import iterate, newton_step

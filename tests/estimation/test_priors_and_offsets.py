@@ -12,10 +12,12 @@ import numpy as np
 import pytest
 from ballplate.results.checked_files import check
 from ballplate.results.fitting import fit
-from ballplate.simulator.design.arrays import Design, State, nominal_state
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.measurement import nominal_state
 from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.design.observations.readings import reading_blocks
 from ballplate.simulator.design.parameters import shared_layout
+from ballplate.simulator.design.state import State
 from ballplate.simulator.estimation.gauss_newton import moved
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out

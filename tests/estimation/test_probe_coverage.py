@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ballplate.simulator.design.arrays import Design, nominal_state
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.measurement import nominal_state
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import written_in_python

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.results.fitting import fit
-from ballplate.simulator.design.arrays import nominal_state
+from ballplate.simulator.design.measurement import nominal_state
 from ballplate.simulator.design.observations.readings import reading_weights
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load

@@ -19,7 +19,7 @@ from ballplate.extensions.certificates.certificate_files import (
 from ballplate.montecarlo.reference import Truth, reference
 from ballplate.montecarlo.replicates import draw, estimate_batch
 from ballplate.results.checked_files import predict
-from ballplate.simulator.design.arrays import nominal_state
+from ballplate.simulator.design.measurement import nominal_state
 from ballplate.simulator.design.observations.star import Star, Stars, observed_stars
 from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.gauss_newton import iterate

@@ -361,7 +361,7 @@ def test_many_distances_are_absorbed_some_at_a_time(
     (tmp_path / "e.yaml").write_text(text)
     design = lay_out(load(tmp_path / "e.yaml")[0])
     arguments = design, shared_layout(design)
-    from ballplate.simulator.design.arrays import nominal_state
+    from ballplate.simulator.design.measurement import nominal_state
 
     state = nominal_state(design)
     assert SMALL < 3 * 196

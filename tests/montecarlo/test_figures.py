@@ -26,7 +26,8 @@ from ballplate.montecarlo.reference import Reference, reference
 from ballplate.montecarlo.replicates import BATCH, Estimates, estimate_batch
 from ballplate.montecarlo.targets import MonteCarloQuantity, sample_of_pairs, targets
 from ballplate.results.checked_files import predict
-from ballplate.simulator.design.arrays import Design, nominal_state
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.measurement import nominal_state
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.design.observations.readings import expected_readings, reading_blocks
 from ballplate.simulator.design.parameters import shared_layout

@@ -14,7 +14,7 @@ import pytest
 from ballplate.montecarlo.experiments import trials, true_experiment
 from ballplate.montecarlo.reference import reference
 from ballplate.montecarlo.replicates import BATCH, draw
-from ballplate.simulator.design.noise import Noise
+from ballplate.simulator.design.objects import Noise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.readings.simulated import (

@@ -9,12 +9,14 @@ import pytest
 from ballplate.montecarlo.expansion import Direct, Expansion
 from ballplate.montecarlo.reference import Reference, Truth, reference
 from ballplate.montecarlo.replicates import BATCH, Estimates, draw, estimate_batch
-from ballplate.simulator.design.arrays import Design, Readings, State, nominal_state
+from ballplate.simulator.design.arrays import Design, Readings
+from ballplate.simulator.design.measurement import nominal_state
 from ballplate.simulator.design.objects import Machine, Volume
 from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.design.observations.priors import Priors
+from ballplate.simulator.design.state import State
 from ballplate.simulator.estimation.gauss_newton import iterate
 from ballplate.simulator.geometry.motions import rotation_from_vector
 from ballplate.simulator.machines.metric import MetricModel

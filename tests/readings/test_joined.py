@@ -13,12 +13,8 @@ import numpy as np
 import pytest
 from ballplate.extensions.assumptions.assumed import assumptions_of
 from ballplate.extensions.assumptions.effects import _bias
-from ballplate.simulator.design.arrays import (
-    Design,
-    Readings,
-    UnmatchedReadingsError,
-    reading_uncertainties,
-)
+from ballplate.simulator.design.arrays import Design, Readings
+from ballplate.simulator.design.measurement import UnmatchedReadingsError, reading_uncertainties
 from ballplate.simulator.design.objects import Balls
 from ballplate.simulator.estimation.gauss_newton import estimate, newton_step
 from ballplate.simulator.estimation.linearisation import linearise

@@ -10,7 +10,8 @@ from ballplate.simulator.computing.numerics import svd
 from ballplate.simulator.inputs.number_arrays import Flags
 from ballplate.simulator.machines.protocol import Array, ErrorModel, Unit
 
-from ..arrays import Design, Observations, Replicates, Rows, State
+from ..arrays import Design, Observations, Rows
+from ..state import Replicates, State
 from .whitening import EXACT
 
 # Extent of an artefact in parts of its largest one below which it has none in a direction.

@@ -11,7 +11,8 @@ import numpy as np
 from ballplate.simulator.geometry.ball_layouts import BallLayout
 from ballplate.simulator.machines.protocol import Array, ErrorModel, Unit
 
-from ..arrays import Design, Observations, State
+from ..arrays import Design, Observations
+from ..state import State
 from .balls import BallObservations
 from .whitening import CovarianceRoot, at_least_exact
 

@@ -12,7 +12,8 @@ from ballplate.simulator.inputs.quantities import LengthFunction
 from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers
 from numpy.typing import NDArray
 
-from ..arrays import Design, State, Words
+from ..arrays import Design, Words
+from ..state import State
 from .balls import BallObservations
 from .calibration import Calibration, CertifiedValue
 from .whitening import CovarianceRoot, at_least_exact

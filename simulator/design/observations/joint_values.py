@@ -14,7 +14,8 @@ import numpy as np
 from ballplate.simulator.inputs.number_arrays import Flags
 from ballplate.simulator.machines.protocol import Array, Integers, Unit
 
-from ..arrays import Design, Replicates, Rows, State
+from ..arrays import Design, Rows
+from ..state import Replicates, State
 from .balls import BallObservations
 from .whitening import EXACT, CovarianceRoot
 

@@ -12,9 +12,11 @@ import numpy as np
 from ballplate.simulator.inputs.number_arrays import Flags
 from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers
 
-from ..arrays import Design, Observations, Rows, State, locations, reading_noise
+from ..arrays import Design, Observations, Rows
+from ..measurement import locations, reading_noise
 from ..objects import LengthArrays
 from ..parameters import SharedLayout, shared_layout
+from ..state import State
 from .readings import expected_readings, offset_sensitivity
 
 if TYPE_CHECKING:

@@ -9,9 +9,10 @@ import numpy as np
 from ballplate.simulator.geometry.motions import vector_from_rotation, vector_rate
 from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers, Unit
 
-from ..arrays import Design, Observations, Rows, State, Words
+from ..arrays import Design, Observations, Rows, Words
 from ..objects import Flags
 from ..parameters import shared_layout
+from ..state import State
 
 
 @dataclass(frozen=True)

@@ -13,16 +13,9 @@ import numpy as np
 from ballplate.simulator.geometry.motions import cross_matrices, pose_size
 from ballplate.simulator.machines.protocol import Array, ErrorModel
 
-from ..arrays import (
-    Design,
-    Readings,
-    State,
-    influence_shifts,
-    locations,
-    measured,
-    nominal_state,
-    reading_uncertainties,
-)
+from ..arrays import Design, Readings, measured
+from ..measurement import influence_shifts, locations, nominal_state, reading_uncertainties
+from ..state import State
 
 # Metres: of the size of probe offsets.
 OFFSET_STEP = 0.1

@@ -19,8 +19,9 @@ from ballplate.simulator.computing.numerics import lstsq, svd
 from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers
 
-from ..arrays import Design, Observations, Replicates, Rows, State
+from ..arrays import Design, Observations, Rows
 from ..parameters import shared_layout
+from ..state import Replicates, State
 from .readings import rotation_sensitivity
 
 # A turn that moves tips by less than this share of their distances moves none: tips are in a line.

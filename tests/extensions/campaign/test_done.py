@@ -9,7 +9,7 @@ from ballplate.extensions.campaign.positions_read import done_candidates
 from ballplate.extensions.planning.experiment_file import experiment_text
 from ballplate.extensions.planning.schedule import run_sheet
 from ballplate.extensions.planning.set_ups import SetUp
-from ballplate.simulator.design.arrays import nominal_state
+from ballplate.simulator.design.measurement import nominal_state
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment, Position

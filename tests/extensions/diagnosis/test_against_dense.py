@@ -14,12 +14,14 @@ from ballplate.extensions.diagnosis.bias_patterns import Patterns, patterns
 from ballplate.extensions.diagnosis.hat import row_places, whitened_residuals
 from ballplate.extensions.diagnosis.redundancy import reliability_of
 from ballplate.extensions.diagnosis.reliability_result import Reliability
-from ballplate.simulator.design.arrays import Design, Readings, State, nominal_state
+from ballplate.simulator.design.arrays import Design, Readings
+from ballplate.simulator.design.measurement import nominal_state
 from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.design.observations.readings import expected_readings
 from ballplate.simulator.design.parameters import shared_layout
+from ballplate.simulator.design.state import State
 from ballplate.simulator.estimation.gauss_newton import iterate, moved
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load

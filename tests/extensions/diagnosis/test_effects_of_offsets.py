@@ -13,9 +13,11 @@ from ballplate.extensions.diagnosis.bias_patterns import patterns
 from ballplate.extensions.diagnosis.effects import changes_of
 from ballplate.extensions.diagnosis.redundancy import reliability_of
 from ballplate.extensions.diagnosis.response import responses
-from ballplate.simulator.design.arrays import Design, State, nominal_state
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.measurement import nominal_state
 from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.design.observations.readings import expected_readings
+from ballplate.simulator.design.state import State
 from ballplate.simulator.estimation.functions import Coordinates, Distances, MeasuredPoints
 from ballplate.simulator.estimation.gauss_newton import iterate
 from ballplate.simulator.estimation.linearisation import linearise

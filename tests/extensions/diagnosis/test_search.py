@@ -13,8 +13,9 @@ from ballplate.extensions.diagnosis.cause_search import FoundCause, Search
 from ballplate.extensions.diagnosis.hat import whitened_residuals
 from ballplate.extensions.diagnosis.remainders import leftover
 from ballplate.extensions.diagnosis.scatter import log_chances, ratio, scatters, with_scatter
-from ballplate.simulator.design.arrays import Design, State
+from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.parameters import shared_layout
+from ballplate.simulator.design.state import State
 from ballplate.simulator.estimation.gauss_newton import estimate, moved
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out

@@ -14,7 +14,8 @@ import pytest
 from ballplate.extensions.diagnosis.cause_search import searched
 from ballplate.extensions.diagnosis.names import name
 from ballplate.extensions.diagnosis.redundancy import reliability_of
-from ballplate.simulator.design.arrays import Design, nominal_state
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.measurement import nominal_state
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.design.observations.readings import expected_readings
 from ballplate.simulator.estimation.gauss_newton import iterate, linearised_fit

@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 import yaml
-from ballplate.simulator.design.arrays import Design, nominal_state
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.measurement import nominal_state
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.estimation.functions import linear_functions

@@ -12,7 +12,7 @@ import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.montecarlo.experiments import trials
-from ballplate.simulator.design.arrays import nominal_state
+from ballplate.simulator.design.measurement import nominal_state
 from ballplate.simulator.design.observations.readings import reading_blocks
 from ballplate.simulator.estimation.functions import linear_functions
 from ballplate.simulator.estimation.linearisation import linearise

@@ -14,7 +14,8 @@ import pytest
 import yaml
 from ballplate.cli import main
 from ballplate.extensions.planning.candidate_rows import draw
-from ballplate.simulator.design.arrays import Design, nominal_state
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.measurement import nominal_state
 from ballplate.simulator.design.observations.readings import reading_blocks
 from ballplate.simulator.estimation.functions import linear_functions
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit

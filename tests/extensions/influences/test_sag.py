@@ -13,7 +13,8 @@ import pytest
 import yaml
 from ballplate.cli import main
 from ballplate.rank.verdicts import verdict
-from ballplate.simulator.design.arrays import Design, influence_shifts, nominal_state
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.measurement import influence_shifts, nominal_state
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load

@@ -13,7 +13,8 @@ from ballplate.extensions.judgement.rungs import (
     kinematic_rung,
     with_model,
 )
-from ballplate.simulator.design.arrays import Design, nominal_state
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.measurement import nominal_state
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment

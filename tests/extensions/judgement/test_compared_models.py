@@ -24,7 +24,7 @@ from ballplate.extensions.judgement.rungs import (
     rung_of_file,
     with_model,
 )
-from ballplate.simulator.design.arrays import nominal_state
+from ballplate.simulator.design.measurement import nominal_state
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment

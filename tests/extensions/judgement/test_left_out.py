@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 import scipy.stats
 from ballplate.extensions.judgement.left_out import rest_of, validate
-from ballplate.simulator.design.arrays import Design, nominal_state, reading_uncertainties
+from ballplate.simulator.design.arrays import Design
+from ballplate.simulator.design.measurement import nominal_state, reading_uncertainties
 from ballplate.simulator.estimation import (
     Distances,
     Linearisation,

@@ -7,7 +7,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 import pytest
-from ballplate.simulator.design.arrays import reading_uncertainties
+from ballplate.simulator.design.measurement import reading_uncertainties
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.yamltree import GivenText
 from ballplate.simulator.readings.reading_files import read_readings

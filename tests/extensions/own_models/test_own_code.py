@@ -8,8 +8,8 @@ from pathlib import Path
 import ballplate as bp
 import pytest
 from ballplate.cli import main
-from ballplate.simulator.design.arrays import influence_shifts, nominal_state
 from ballplate.simulator.design.influence_quantities import Disturbed, Influence, InfluenceParameter
+from ballplate.simulator.design.measurement import influence_shifts, nominal_state
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.inputs.extensions import UnusableError
 from ballplate.simulator.machines.protocol import Array

@@ -20,7 +20,7 @@ from ballplate.extensions.planning.criteria import NAMES, CriterionName
 from ballplate.extensions.planning.remaining_candidates import offer
 from ballplate.extensions.planning.selection import Campaign
 from ballplate.extensions.planning.set_ups import SetUp
-from ballplate.simulator.design.arrays import nominal_state
+from ballplate.simulator.design.measurement import nominal_state
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment, Position

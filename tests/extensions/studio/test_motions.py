@@ -15,7 +15,8 @@ from ballplate.extensions.studio.motions import (
     null_motions,
     weak_motions,
 )
-from ballplate.simulator.design.arrays import State, locations
+from ballplate.simulator.design.measurement import locations
+from ballplate.simulator.design.state import State
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.geometry.motions import rotation_from_vector
