@@ -12,7 +12,7 @@ from ballplate.simulator.machines.protocol import Array
 from .arrays import Design
 from .influence_quantities import Disturbed, Influence
 from .objects import (
-    Readings as Readings,
+    Readings,
 )
 from .state import State
 

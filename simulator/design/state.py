@@ -7,10 +7,6 @@ from dataclasses import dataclass, field
 import numpy as np
 from ballplate.simulator.machines.protocol import Array, Integers
 
-from .objects import (
-    Readings as Readings,
-)
-
 
 @dataclass(frozen=True)
 class State:
