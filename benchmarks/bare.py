@@ -8,9 +8,9 @@ are prepared once for all replicates.
 from __future__ import annotations
 
 import numpy as np
-from ballplate.montecarlo.expansion import Expansion
-from ballplate.montecarlo.reference import Reference
-from ballplate.montecarlo.replicates import BATCH
+from ballplate.montecarlo._expansion import Expansion
+from ballplate.montecarlo._reference import Reference
+from ballplate.montecarlo._replicates import BATCH
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from scipy.linalg import solve_triangular
 

@@ -24,11 +24,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ballplate.montecarlo.expansion import Expansion
+from ballplate.montecarlo._expansion import Expansion
+from ballplate.montecarlo._reference import Reference, Truth, reference
+from ballplate.montecarlo._replicates import BATCH, draw, estimate_batch
+from ballplate.montecarlo._targets import targets
 from ballplate.montecarlo.experiments import TASK, run_trials, sum_of_task
-from ballplate.montecarlo.reference import Reference, Truth, reference
-from ballplate.montecarlo.replicates import BATCH, draw, estimate_batch
-from ballplate.montecarlo.targets import targets
 from ballplate.simulator.design.measurement import nominal_state
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.design.observations.readings import reading_blocks

@@ -16,6 +16,7 @@ from itertools import takewhile
 from pathlib import Path
 
 import pytest
+from ballplate.cli._parsers import COMMANDS
 
 TOP = Path(__file__).parents[1]
 PACKAGES = {"simulator": "ballplate.simulator", "analysis": "ballplate"}
@@ -154,6 +155,30 @@ def test_imports_within_a_room_are_relative_and_between_rooms_absolute() -> None
             else:
                 room = f"{PACKAGES[path.parts[0]]}.{path.parts[1]}"
                 assert not f"{node.module}.".startswith(f"{room}."), (path, node.lineno)
+
+
+def shown_by_faces() -> set[Path]:
+    """Modules with names that a package, or `import ballplate` itself, makes public."""
+    shown = set()
+    for stub in TOP.glob("*/*/__init__.pyi"), [TOP / "analysis" / "__init__.pyi"]:
+        for path in stub:
+            for node in ast.parse(path.read_text(encoding="utf-8")).body:
+                if isinstance(node, ast.ImportFrom):
+                    parts = f"{node.module}".split(".")
+                    folder = TOP if parts[0] in PACKAGES else path.parent
+                    shown.add(folder.joinpath(*parts).with_suffix(".py").relative_to(TOP))
+    return shown
+
+
+def test_modules_of_one_room_alone_begin_with_an_underscore() -> None:
+    shown = shown_by_faces()
+    for path in kernel():
+        is_command = path.parent.name == "cli" and path.stem in COMMANDS
+        if room_of(path) is None or path.name == "__init__.py" or is_command:
+            continue
+        users = {room_of(other) for other, used in arrows().items() if path in used}
+        is_private = users == {room_of(path)} and path not in shown
+        assert is_private == path.name.startswith("_"), (path, users)
 
 
 def test_there_are_few_rooms_and_all_are_in_order() -> None:

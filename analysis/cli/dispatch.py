@@ -19,9 +19,9 @@ from typing import Any
 from ballplate.simulator.computing.signals import ANSWERS
 from ballplate.simulator.inputs.extensions import UnusableError, fault_of, registered
 
+from ._parsers import grammar, parser, tell_of_extensions, with_command
 from .notes import told
 from .outputs import UsageError, check_outputs
-from .parsers import grammar, parser, tell_of_extensions, with_command
 
 
 class StandardOutputError(Exception):

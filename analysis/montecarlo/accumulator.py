@@ -13,9 +13,9 @@ from operator import add
 import numpy as np
 from ballplate.simulator.machines.protocol import Array
 
-from .reference import Reference
-from .replicates import Estimates
-from .targets import MonteCarloQuantity
+from ._reference import Reference
+from ._replicates import Estimates
+from ._targets import MonteCarloQuantity
 
 # Coverage probability of expanded uncertainties.
 COVERAGE = 0.95

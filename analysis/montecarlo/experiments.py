@@ -18,11 +18,11 @@ from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.machines.protocol import Array, ErrorModel, Parameter, Reported
 from ballplate.simulator.readings.simulated import NoReadingError, on_stated_machine
 
+from ._reference import DivergedError, Reference, Truth, reference
+from ._replicates import BATCH, estimate_batch
+from ._targets import MonteCarloQuantity, targets
 from .accumulator import Accumulator, accumulate
 from .figures import MonteCarloOutcome, outcome, power_of_misfit
-from .reference import DivergedError, Reference, Truth, reference
-from .replicates import BATCH, estimate_batch
-from .targets import MonteCarloQuantity, targets
 
 # Batches of a task: constant, so that the order of sums is independent of the workers.
 BATCHES = 4

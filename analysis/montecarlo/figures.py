@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ._reference import Reference
+from ._targets import MonteCarloQuantity
 from .accumulator import (
     ACTUAL,
     COVERAGE,
@@ -17,8 +19,6 @@ from .accumulator import (
     QuantityAccumulator,
     factors,
 )
-from .reference import Reference
-from .targets import MonteCarloQuantity
 
 # Standard errors beyond which a difference is significant; false in one of some hundred runs with
 # thirty values each.

@@ -163,7 +163,7 @@ def null_directions(at: Linearisation) -> tuple[Direction, ...]:
     """Return the undetermined directions, in a basis in which each involves few parameters."""
     if not at.deficiency:
         return ()
-    from .descriptions import described
+    from ._descriptions import described
 
     return tuple(described(at.design, at.layout, *change) for change in null_changes(at))
 
@@ -174,7 +174,7 @@ def null_changes(at: Linearisation) -> list[tuple[Array, Array]]:
     """
     if not at.deficiency:
         return []
-    from .descriptions import largest_displacement, signed
+    from ._descriptions import largest_displacement, signed
 
     changes = []
     for mixture in independent_mixture(at).T:
@@ -188,7 +188,7 @@ def weak_changes(at: Linearisation, target: Target | None = None) -> list[Array]
     """Return each weak direction as reported, weakest first: changes (s,) of the shared parameters,
     one standard deviation long.
     """
-    from .descriptions import signed
+    from ._descriptions import signed
 
     still = np.zeros_like(at.design.balls.places)
     return [signed(at.design, at.layout, root, still)[0] for root in _weak_roots(at, target)[0].T]
@@ -250,7 +250,7 @@ def _weak_directions(
 ) -> tuple[Direction, ...]:
     if not roots.shape[1]:
         return ()
-    from .descriptions import described, signed
+    from ._descriptions import described, signed
 
     directions = []
     of_points = np.sqrt(2.0 * (relative_changes(design, layout, roots) ** 2).mean(axis=1))

@@ -16,6 +16,8 @@ from ballplate.simulator.inputs.arguments import ensure_positive, ensure_type
 from ballplate.simulator.inputs.extensions import function, service
 from ballplate.simulator.machines.protocol import Array
 
+from ._fit_findings import FitFindings
+from ._fit_tables import fit_data, fit_lines
 from .estimates import (
     ESTIMATE_COLUMNS,
     CorrectedPoints,
@@ -28,8 +30,6 @@ from .estimates import (
 from .extension_results import (
     IssuedCertificate,
 )
-from .fit_findings import FitFindings
-from .fit_tables import fit_data, fit_lines
 from .prediction import by_label
 from .residuals import (
     reading_residuals,

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from ballplate.cli.parsers import GROUPS, parser as command_line
+from ballplate.cli._parsers import GROUPS, parser as command_line
 from ballplate.extensions.machine_files.machine_sections import schema as machine_schema
 from ballplate.extensions.machine_files.map_sections import schema as map_schema
 from ballplate.extensions.sweeps.sweep_schema import schema as sweep_schema

@@ -16,13 +16,13 @@ from ballplate.extensions.sweeps import axes, bundle, load, sweep_settings
 from ballplate.montecarlo import experiments
 from ballplate.simulator.design.observations import calibration, joint_values
 from ballplate.simulator.experiment import (
+    _priors,
     changes,
-    priors,
     references,
     sections,
     size_checks,
 )
-from ballplate.simulator.experiment.artefacts import MOST_BALLS, MOST_BALLS_OF_ALL
+from ballplate.simulator.experiment._artefacts import MOST_BALLS, MOST_BALLS_OF_ALL
 from ballplate.simulator.geometry.artefacts import MOST_DIRECTIONS
 from ballplate.simulator.inputs import decoding, messages, settings, tables, yamltree
 from sphinx.application import Sphinx
@@ -57,7 +57,7 @@ LIMITS = {
         "evaluation points": (sections.MOST_POINTS,),
         "evaluation points times axes times machine errors": (size_checks.MOST_DERIVATIVES,),
         "measuring tasks": (settings.MOST_SEVERAL,),
-        "priors": (priors.MOST_PRIORS,),
+        "priors": (_priors.MOST_PRIORS,),
         "variants, and balls, values and points of all": (
             changes.MOST_VARIANTS,
             changes.MOST_OF_ALL,

@@ -27,8 +27,8 @@ from ballplate.simulator.inputs.validation import OpenKinds
 from ballplate.simulator.machines.protocol import Array
 from pydantic import Field
 
+from ._calibrated_distances import DistancesSettings, read_distances
 from .calibrated_coordinates import CoordinatesSettings, read_coordinates
-from .calibrated_distances import DistancesSettings, read_distances
 from .references import References
 
 

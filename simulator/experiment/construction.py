@@ -11,11 +11,11 @@ from ballplate.simulator.inputs.yamltree import Node, mark_of
 from ballplate.simulator.machines.settings import with_defaults
 from ballplate.simulator.machines.truth import with_model_defaults
 
+from ._resolution import Resolved
 from .machine import target_of
 from .model import Candidate, Evaluation, Experiment, Position
 from .own_sections import needed_extensions
 from .readings_section import no_settings
-from .resolution import Resolved
 
 
 def with_chosen(experiment: Experiment, chosen: Sequence[Candidate]) -> Experiment:

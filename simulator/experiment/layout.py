@@ -41,8 +41,8 @@ from ballplate.simulator.inputs.yamltree import Mark
 from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.machines.settings import build_error_model
 
-from .influences import with_influences
-from .length_standards import standard_lengths
+from ._influences import with_influences
+from ._length_standards import standard_lengths
 from .model import Experiment, Prior
 
 if TYPE_CHECKING:

@@ -28,10 +28,10 @@ from ballplate.simulator.inputs.yamltree import (
     read_text,
 )
 
+from ._resolution import resolve
 from .changes import MOST_OF_ALL, in_variants, node_of, variant_trees
 from .construction import construct, evaluable
 from .model import Experiment
-from .resolution import resolve
 from .validation import validate_sections
 
 

@@ -42,7 +42,7 @@ KINDS = ("commands", "functions", "services", "schemas", *OF_FILES, "quantities"
 
 # Modules and tables of the kernel's names; the kernel has no services and no influence quantities.
 _KERNEL_TABLES = {
-    "commands": ("cli.parsers", "COMMANDS"),
+    "commands": ("cli._parsers", "COMMANDS"),
     "functions": ("", "__all__"),
     "schemas": ("cli.schema", "SCHEMAS"),
     "artefacts": ("simulator.geometry.artefacts", "ARTEFACTS"),

@@ -58,7 +58,7 @@ def explain_in(
 ) -> None:
     """Add messages about a node at a path."""
     # Most files are right, and wording is the largest module of this room.
-    from .wording import explain
+    from ._wording import explain
 
     for explanation in explain(error.errors(include_url=False), node, _schema(adapter)):
         problems.add((*steps, *explanation.steps), explanation.text, explanation.of_key)

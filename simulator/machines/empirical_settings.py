@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
 from ballplate.simulator.inputs.settings import Forms, Settings
 from pydantic import ConfigDict, Discriminator, Field, Tag, model_validator
 
-from .bases import Basis
-from .basis_settings import (
+from ._basis_settings import (
     BASIS,
     VARIABLES,
     WITH_CONSTANT,
@@ -18,10 +17,11 @@ from .basis_settings import (
     basis_of,
     without,
 )
+from .bases import Basis
 from .protocol import Corner, ErrorModel, ErrorModelKind
 
 if TYPE_CHECKING:
-    from .terms import Radial, Terms
+    from ._terms import Radial, Terms
 
 Centres = Annotated[int, Field(ge=2, le=8)]
 MOST_INTERIOR = 6
@@ -52,7 +52,7 @@ class RadialSettings(Settings):
 
     @model_validator(mode="after")
     def _possible(self) -> Self:
-        from .empirical import empirical_model
+        from ._empirical import empirical_model
 
         if self.function not in WITH_CONSTANT:
             without(self, ("constant",), f"the function {self.function}")
@@ -67,7 +67,7 @@ class RadialSettings(Settings):
 
     def terms(self) -> Radial:
         """Return the radial functions."""
-        from .terms import Radial
+        from ._terms import Radial
 
         return Radial(self.centres, self.constant, self.function)
 
@@ -221,7 +221,7 @@ def _bases(settings: EmpiricalSettings | RotationFunctionsSettings) -> tuple[Bas
 
 
 def _terms(settings: EmpiricalSettings | RotationFunctionsSettings) -> Terms:
-    from .terms import quadratic, sums, tensor, univariate
+    from ._terms import quadratic, sums, tensor, univariate
 
     if isinstance(settings.terms, RadialSettings):
         return settings.terms.terms()
@@ -232,8 +232,8 @@ def _terms(settings: EmpiricalSettings | RotationFunctionsSettings) -> Terms:
 
 
 def _empirical(settings: EmpiricalSettings, lower: Corner, upper: Corner) -> ErrorModel:
-    from .empirical import empirical_model
-    from .terms import no_terms
+    from ._empirical import empirical_model
+    from ._terms import no_terms
 
     functions = settings.rotation_functions
     of_rotations = (

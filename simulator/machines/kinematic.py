@@ -158,7 +158,7 @@ class KinematicModel:
         translation, rotation = self.motions(x, a)
         from_origin = x - np.asarray(self.lower if self.origin is None else self.origin)
         if self.full_rotations:
-            from .rigid_chain import rigid_chain
+            from ._rigid_chain import rigid_chain
 
             return (
                 rigid_chain(self.arrangement, from_origin, translation, rotation, p)[0]
@@ -174,7 +174,7 @@ class KinematicModel:
         bases = self._bases(x)
         from_origin = x - np.asarray(self.lower if self.origin is None else self.origin)
         if self.full_rotations:
-            from .rigid_chain import rigid_chain
+            from ._rigid_chain import rigid_chain
 
             translation, rotation = self._motions(bases, a, len(x))
             _, by_translation, by_rotation = rigid_chain(

@@ -8,6 +8,7 @@ from ballplate.simulator.inputs.messages import Steps
 from ballplate.simulator.inputs.settings import Forms, Settings
 from pydantic import Field, create_model, model_validator
 
+from ._basis_settings import BASIS, BasisSettings, SplineSettings, basis_of, without
 from .arrangement import (
     ARRANGEMENT,
     AXIS_ERRORS,
@@ -17,7 +18,6 @@ from .arrangement import (
     arrangement_of,
 )
 from .bases import Basis
-from .basis_settings import BASIS, BasisSettings, SplineSettings, basis_of, without
 from .kinematic import PlaneModel, in_plane, in_space, kinematic_model_of
 from .protocol import Corner, ErrorModel, ErrorModelKind
 

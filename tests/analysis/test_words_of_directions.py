@@ -7,7 +7,7 @@ from itertools import product
 import ballplate as bp
 import numpy as np
 import pytest
-from ballplate.rank.descriptions import deformation, shape
+from ballplate.rank._descriptions import deformation, shape
 
 from tests.analysis import wording
 from tests.reference.small_quickstart import small_sections

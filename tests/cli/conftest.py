@@ -10,7 +10,7 @@ from typing import Any
 import ballplate as bp
 import pytest
 from ballplate.cli import main
-from ballplate.cli.parsers import module_of
+from ballplate.cli._parsers import module_of
 from ballplate.extensions.planning import campaign_choice
 
 from tests.cli.walk import BALLS, DESIGN, WALK

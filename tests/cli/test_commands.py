@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.cli.parsers import GROUPS, commands_of_all
+from ballplate.cli._parsers import GROUPS, commands_of_all
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.machines.truth import true_parameters

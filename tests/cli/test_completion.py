@@ -7,7 +7,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from ballplate.cli import main, outputs, parsers
+from ballplate.cli import _parsers, main, outputs
 
 from tests.cli.walk import commands
 
@@ -25,9 +25,9 @@ def printed(capsys: pytest.CaptureFixture[str], shell: str) -> str:
 
 def completed(script: str, folder: Path, *words: str) -> set[str]:
     """What bash offers for the last of the words."""
-    (folder / "parsers.bash").write_text(script, encoding="utf-8")
+    (folder / "_parsers.bash").write_text(script, encoding="utf-8")
     code = (
-        'source parsers.bash; COMP_WORDS=(ballplate "$@"); COMP_CWORD=$#;'
+        'source _parsers.bash; COMP_WORDS=(ballplate "$@"); COMP_CWORD=$#;'
         ' COMP_LINE="${COMP_WORDS[*]}"'
     )
     code += (
@@ -63,7 +63,7 @@ def test_commands_options_choices_and_files(
     assert "design.yaml" in completed(script, tmp_path, "plan", "x.yaml", "--sheet", "des")
 
 
-@pytest.mark.parametrize("shell", parsers.SHELLS)
+@pytest.mark.parametrize("shell", _parsers.SHELLS)
 def test_each_shell_has_a_script_with_all_commands(
     shell: str, capsys: pytest.CaptureFixture[str]
 ) -> None:

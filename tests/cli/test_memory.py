@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.cli.parsers import module_of
+from ballplate.cli._parsers import module_of
 from ballplate.simulator.computing.processes import in_processes
 
 QUICKSTART = "designs/quickstart.yaml"

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 import yaml
 from ballplate.cli import main
-from ballplate.cli.parsers import parser
+from ballplate.cli._parsers import parser
 
 from tests.reference.small_quickstart import small_sections
 

@@ -17,7 +17,7 @@ from typing import Any
 
 import pytest
 import yaml
-from ballplate.cli.parsers import parser
+from ballplate.cli._parsers import parser
 from ballplate.extensions.machine_files.machine_sections import schema as machine_schema
 from ballplate.simulator.experiment.json_schema import schema
 

@@ -16,8 +16,8 @@ from ballplate.extensions.certificates.certificate_files import (
     with_drawn_values,
     write_certificate,
 )
-from ballplate.montecarlo.reference import Truth, reference
-from ballplate.montecarlo.replicates import draw, estimate_batch
+from ballplate.montecarlo._reference import Truth, reference
+from ballplate.montecarlo._replicates import draw, estimate_batch
 from ballplate.results.checked_files import predict
 from ballplate.simulator.design.measurement import nominal_state
 from ballplate.simulator.design.observations.star import Star, Stars, observed_stars

@@ -226,9 +226,9 @@ def test_readings_and_certificates_of_a_campaign(folder: Path, form: str) -> Non
 READERS = {
     "simulator/experiment/certificate_tables.py",  # lengths, coordinates, own
     "analysis/extensions/influences/sag.py",
-    "simulator/experiment/probes.py",  # star
+    "simulator/experiment/_probes.py",  # star
     "simulator/experiment/machine.py",  # points
-    "simulator/experiment/artefacts.py",  # balls
+    "simulator/experiment/_artefacts.py",  # balls
     "analysis/extensions/machine_files/curve_files.py",  # exx, eyx
     "simulator/inputs/covariances.py",
     "simulator/readings/reading_sources.py",

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import yaml
 from ballplate.simulator.design.observations.star import Star
+from ballplate.simulator.experiment._probes import doubt_of_table
 from ballplate.simulator.experiment.loading import load
-from ballplate.simulator.experiment.probes import doubt_of_table
 from scipy.spatial.transform import Rotation
 
 from tests.experiment import wording

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from ballplate.simulator.machines._basis_settings import SplineSettings
 from ballplate.simulator.machines.bases import Basis, Ends, Monomial, Polynomial, whole_values
-from ballplate.simulator.machines.basis_settings import SplineSettings
 from ballplate.simulator.machines.spline_basis import Spline
 from hypothesis import given, strategies as st
 from scipy.interpolate import BSpline

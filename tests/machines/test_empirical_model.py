@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from ballplate.simulator.machines.bases import Monomial, Polynomial
-from ballplate.simulator.machines.empirical import (
+from ballplate.simulator.machines._empirical import (
     FRAME,
     FUNCTIONS,
     EmpiricalModel,
     empirical_model,
 )
+from ballplate.simulator.machines._terms import Radial, Terms, quadratic, sums, tensor
+from ballplate.simulator.machines.bases import Monomial, Polynomial
 from ballplate.simulator.machines.spline_basis import Spline
-from ballplate.simulator.machines.terms import Radial, Terms, quadratic, sums, tensor
 
 LOWER, UPPER = (-0.2, 0.1, 0.0), (0.8, 0.7, 1.3)
 TERMS: dict[str, Terms] = {

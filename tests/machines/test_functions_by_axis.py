@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from ballplate.simulator.machines.basis_settings import SplineSettings
-from ballplate.simulator.machines.empirical import FUNCTIONS, EmpiricalModel
+from ballplate.simulator.machines._basis_settings import SplineSettings
+from ballplate.simulator.machines._empirical import FUNCTIONS, EmpiricalModel
 from ballplate.simulator.machines.empirical_settings import EmpiricalSettings
 from ballplate.simulator.machines.settings import build_error_model
 from numpy.polynomial import Chebyshev, Polynomial

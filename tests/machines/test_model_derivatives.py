@@ -8,9 +8,18 @@ from ballplate.extensions.machine_files.description import fitted_volumetric, tr
 from ballplate.extensions.machine_files.framing import FramedModel
 from ballplate.extensions.machine_files.machine_file import load_machine
 from ballplate.montecarlo.experiments import JoinedModel
+from ballplate.simulator.machines._empirical import empirical_model
+from ballplate.simulator.machines._terms import (
+    RADIAL,
+    Radial,
+    no_terms,
+    quadratic,
+    sums,
+    tensor,
+    univariate,
+)
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS, Arrangement
 from ballplate.simulator.machines.bases import Monomial, Polynomial
-from ballplate.simulator.machines.empirical import empirical_model
 from ballplate.simulator.machines.kinematic import (
     PlaneModel,
     in_plane,
@@ -20,15 +29,6 @@ from ballplate.simulator.machines.kinematic import (
 from ballplate.simulator.machines.metric import MetricModel, SpatialMetricModel
 from ballplate.simulator.machines.protocol import ErrorModel, HasLines
 from ballplate.simulator.machines.spline_basis import Spline
-from ballplate.simulator.machines.terms import (
-    RADIAL,
-    Radial,
-    no_terms,
-    quadratic,
-    sums,
-    tensor,
-    univariate,
-)
 from hypothesis import given, strategies as st
 
 from tests.reference.derivatives import assert_derivative, complex_step

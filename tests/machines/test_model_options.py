@@ -10,6 +10,9 @@ import pytest
 from ballplate.extensions.machine_files.curves import Points, curves_model
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.machines._basis_settings import WITH_CONSTANT, RadialName
+from ballplate.simulator.machines._empirical import empirical_model
+from ballplate.simulator.machines._terms import RADIAL, Radial, sums, univariate
 from ballplate.simulator.machines.arrangement import (
     ARRANGEMENTS,
     AXIS_ERRORS,
@@ -17,17 +20,9 @@ from ballplate.simulator.machines.arrangement import (
     SQUARENESS_ERRORS,
 )
 from ballplate.simulator.machines.bases import Polynomial
-from ballplate.simulator.machines.basis_settings import WITH_CONSTANT, RadialName
-from ballplate.simulator.machines.empirical import empirical_model
 from ballplate.simulator.machines.kinematic import KinematicModel, in_plane, kinematic_model_of
 from ballplate.simulator.machines.settings import build_error_model
 from ballplate.simulator.machines.spline_basis import Spline
-from ballplate.simulator.machines.terms import (
-    RADIAL,
-    Radial,
-    sums,
-    univariate,
-)
 
 LOWER, UPPER = (-0.2, 0.1, 0.0), (0.8, 0.7, 1.3)
 

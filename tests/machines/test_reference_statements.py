@@ -12,15 +12,15 @@ from ballplate.results.checked_files import predict
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.machines._empirical import empirical_model
+from ballplate.simulator.machines._terms import sums
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.bases import Polynomial
-from ballplate.simulator.machines.empirical import empirical_model
 from ballplate.simulator.machines.kinematic import (
     kinematic_model,
 )
 from ballplate.simulator.machines.metric import MetricModel, SpatialMetricModel
 from ballplate.simulator.machines.protocol import ErrorModel
-from ballplate.simulator.machines.terms import sums
 from ballplate.simulator.machines.truth import CoefficientSettings, TruthError, true_parameters
 from scipy.spatial.transform import Rotation
 

@@ -11,14 +11,14 @@ import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.extensions.sweeps.task import trial_figures
-from ballplate.montecarlo import replicates
+from ballplate.montecarlo import _replicates
+from ballplate.montecarlo._reference import Reference, reference, replicate_data
+from ballplate.montecarlo._replicates import BATCH, _gradient, _refined, _step, draw, estimate_batch
+from ballplate.montecarlo._targets import targets
 from ballplate.montecarlo.accumulator import accumulate
 from ballplate.montecarlo.comparison_tables import trials_data, trials_lines
 from ballplate.montecarlo.experiments import Trials, true_experiment
 from ballplate.montecarlo.figures import MonteCarloOutcome, outcome
-from ballplate.montecarlo.reference import Reference, reference, replicate_data
-from ballplate.montecarlo.replicates import BATCH, _gradient, _refined, _step, draw, estimate_batch
-from ballplate.montecarlo.targets import targets
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.gauss_newton import estimate
 from ballplate.simulator.geometry.motions import rotation_from_vector
@@ -124,7 +124,7 @@ def test_an_estimate_by_itself_is_that_of_the_passes(
 ) -> None:
     shared = reference(design, truth(design))
     passes = estimate_batch(shared, 5, 0, 3)
-    monkeypatch.setattr(replicates, "SMALLEST_STEP", -1.0)
+    monkeypatch.setattr(_replicates, "SMALLEST_STEP", -1.0)
     alone = estimate_batch(shared, 5, 0, 3)
     assert alone.converged.all() and not (alone.found.a == passes.found.a).any()
     own = alone.found

@@ -13,6 +13,9 @@ from typing import Any
 import numpy as np
 import pytest
 import scipy.stats
+from ballplate.montecarlo._reference import Reference, reference
+from ballplate.montecarlo._replicates import BATCH, Estimates, estimate_batch
+from ballplate.montecarlo._targets import MonteCarloQuantity, sample_of_pairs, targets
 from ballplate.montecarlo.accumulator import accumulate
 from ballplate.montecarlo.comparison_tables import trials_data, trials_lines, with_error
 from ballplate.montecarlo.experiments import run_trials, trials, true_experiment
@@ -22,9 +25,6 @@ from ballplate.montecarlo.figures import (
     MonteCarloOutcome,
     outcome,
 )
-from ballplate.montecarlo.reference import Reference, reference
-from ballplate.montecarlo.replicates import BATCH, Estimates, estimate_batch
-from ballplate.montecarlo.targets import MonteCarloQuantity, sample_of_pairs, targets
 from ballplate.results.checked_files import predict
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.measurement import nominal_state

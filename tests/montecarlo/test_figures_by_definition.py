@@ -14,12 +14,12 @@ import ballplate as bp
 import numpy as np
 import pytest
 import yaml
+from ballplate.montecarlo._reference import Reference, Truth, complete_fit, reference
+from ballplate.montecarlo._replicates import Estimates, draw, estimate_batch
+from ballplate.montecarlo._targets import MonteCarloQuantity, targets
 from ballplate.montecarlo.accumulator import Accumulator, accumulate
 from ballplate.montecarlo.experiments import TASK, accuracy_of, run_trials, true_experiment
 from ballplate.montecarlo.figures import outcome
-from ballplate.montecarlo.reference import Reference, Truth, complete_fit, reference
-from ballplate.montecarlo.replicates import Estimates, draw, estimate_batch
-from ballplate.montecarlo.targets import MonteCarloQuantity, targets
 from ballplate.simulator.computing.steps import ProgressStep
 from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates
 from ballplate.simulator.design.observations.distances import CalibratedDistances

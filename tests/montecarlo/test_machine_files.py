@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from ballplate.montecarlo._reference import reference
+from ballplate.montecarlo._targets import targets
 from ballplate.montecarlo.experiments import true_experiment
-from ballplate.montecarlo.reference import reference
-from ballplate.montecarlo.targets import targets
 from ballplate.simulator.experiment.loading import load
 
 SHIPPED = Path("designs/park")

@@ -11,9 +11,9 @@ from typing import Any
 import ballplate as bp
 import numpy as np
 import pytest
+from ballplate.montecarlo._reference import reference
+from ballplate.montecarlo._replicates import BATCH, draw
 from ballplate.montecarlo.experiments import trials, true_experiment
-from ballplate.montecarlo.reference import reference
-from ballplate.montecarlo.replicates import BATCH, draw
 from ballplate.simulator.design.objects import Noise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.inputs.messages import ExperimentError

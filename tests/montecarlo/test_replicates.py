@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from ballplate.montecarlo.expansion import Direct, Expansion
-from ballplate.montecarlo.reference import Reference, Truth, reference
-from ballplate.montecarlo.replicates import BATCH, Estimates, draw, estimate_batch
+from ballplate.montecarlo._expansion import Direct, Expansion
+from ballplate.montecarlo._reference import Reference, Truth, reference
+from ballplate.montecarlo._replicates import BATCH, Estimates, draw, estimate_batch
 from ballplate.simulator.design.arrays import Design, Readings
 from ballplate.simulator.design.measurement import nominal_state
 from ballplate.simulator.design.objects import Machine, Volume

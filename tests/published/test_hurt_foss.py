@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.extensions.estimators.length_equations import LengthEstimator, length_estimate
+from ballplate.montecarlo._reference import Truth, reference
+from ballplate.montecarlo._replicates import BATCH, estimate_batch
 from ballplate.montecarlo.experiments import true_experiment
-from ballplate.montecarlo.reference import Truth, reference
-from ballplate.montecarlo.replicates import BATCH, estimate_batch
 from ballplate.results.checked_files import predict
 from ballplate.results.fitting import fit
 from ballplate.simulator.design.arrays import Design

@@ -283,7 +283,7 @@ WITHOUT_A_JOIN = {
     "analysis/api.py": "a table of the readings",
     "analysis/cli/simulate.py": "a table of the readings",
     "analysis/extensions/certificates/interface.py": "values of certificates alone",
-    "analysis/montecarlo/reference.py": "made of the rows of the design",
+    "analysis/montecarlo/_reference.py": "made of the rows of the design",
 }
 
 

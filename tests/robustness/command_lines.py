@@ -12,7 +12,7 @@ from functools import cache
 from pathlib import Path
 from random import Random
 
-from ballplate.cli.parsers import parser
+from ballplate.cli._parsers import parser
 
 # Tried with every option; those that its type takes are what it is for.
 PLAUSIBLE = (

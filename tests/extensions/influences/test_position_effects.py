@@ -194,7 +194,7 @@ def test_poses_of_a_pool_do_not_count(
     """A plan solves for those of a choice only: a limit that all positions exceed is none of it."""
     every = small.with_(influences=[SCALE])
     design, of_balls = lay_out(every), 3 * 9
-    limit = "ballplate.simulator.experiment.influences.MOST_SHARED"
+    limit = "ballplate.simulator.experiment._influences.MOST_SHARED"
     monkeypatch.setattr(limit, design.parameter_count - of_balls - 1)
     with pytest.raises(ExperimentError, match=wording.LEAVE_POSITIONS_OR_CANDIDATES_OUT):
         lay_out(every)

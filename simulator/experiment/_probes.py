@@ -15,7 +15,7 @@ from ballplate.simulator.inputs.number_arrays import Array
 from ballplate.simulator.inputs.settings import hint, listing
 from ballplate.simulator.inputs.yamltree import written
 
-from .artefacts import DEFAULT_PROBE
+from ._artefacts import DEFAULT_PROBE
 from .model import Probe
 from .position_sections import HeadSettings, ProbeSettings, StarSettings
 from .references import References, lengths_per_axis

@@ -25,8 +25,8 @@ from ballplate.simulator.machines.protocol import Array, Integers
 from ballplate.uncertainty.pairs import pairs_of
 from ballplate.uncertainty.quantities import QUANTITIES, functions_of
 
-from .reference import Reference
-from .replicates import Deviations
+from ._reference import Reference
+from ._replicates import Deviations
 
 # Distances followed through all replicates; more are sampled.
 MOST_PAIRS = 1000

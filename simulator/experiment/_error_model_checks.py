@@ -9,10 +9,7 @@ from ballplate.simulator.design.objects import Machine
 from ballplate.simulator.inputs.extensions import provided
 from ballplate.simulator.inputs.messages import ExperimentError, Steps
 from ballplate.simulator.machines.protocol import CustomModelError
-from ballplate.simulator.machines.settings import (
-    build_error_model,
-    kind_of,
-)
+from ballplate.simulator.machines.settings import build_error_model, kind_of
 from ballplate.simulator.machines.truth import (
     FurtherTrueMachine,
     RandomSettings,

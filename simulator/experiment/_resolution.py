@@ -15,18 +15,18 @@ from ballplate.simulator.inputs.problems import Problems
 from ballplate.simulator.inputs.trust import Trust
 from ballplate.simulator.inputs.yamltree import written
 
-from .artefacts import resolve_references
+from ._artefacts import resolve_references
+from ._checks import check_calibration_read, check_names, check_radii, check_readings, check_use
+from ._error_model_checks import check_true_machine, with_usable_error_model
+from ._influences import resolve_influences
+from ._probes import resolve_probes, resolve_stars
 from .bounds import Bounds, check_inside, resolve_bounds
 from .calibrations import resolve_calibration
-from .checks import check_calibration_read, check_names, check_radii, check_readings, check_use
-from .error_model_checks import check_true_machine, with_usable_error_model
-from .influences import resolve_influences
 from .machine import resolve_evaluation, resolve_machine, resolve_noise
 from .model import Evaluation, Pool, Position, Prior, Probe
 from .own_sections import needed_service, resolve_own_sections
 from .placements import resolve_positions
 from .position_sections import PositionSettings
-from .probes import resolve_probes, resolve_stars
 from .references import References
 from .sections import InfluenceSettings
 from .size_checks import check_size
@@ -111,7 +111,7 @@ def resolve(
         pool = service("resolve_pool")(sections, candidates, calibrations, references)
     priors: tuple[Prior, ...] = ()
     if sections.priors:
-        from .priors import resolve_priors
+        from ._priors import resolve_priors
 
         priors = resolve_priors(sections, machine, named, probes, references)
     influences = resolve_influences(sections, named, references)

@@ -16,31 +16,13 @@ from ballplate.simulator.readings.observed_readings import ObservedReadings
 from ballplate.uncertainty.pairs import TaskUncertainty
 from ballplate.uncertainty.summaries import Quantity, tasks_of
 
-from .adjustments import (
-    Adjustment,
-    few_degrees_of_freedom,
-)
-from .estimates import (
-    EstimatedFunctions,
-    ParameterEstimate,
-)
-from .extension_results import (
-    SeparateSigmas,
-    Suspicion,
-    has_exact_values,
-    lack_of_fit,
-)
+from .adjustments import Adjustment, few_degrees_of_freedom
+from .estimates import EstimatedFunctions, ParameterEstimate
+from .extension_results import SeparateSigmas, Suspicion, has_exact_values, lack_of_fit
 from .plates import PlateCoordinates
 from .prediction import length_headline, rank_words
-from .residuals import (
-    EstimatedCurve,
-    LackOfFit,
-    Residual,
-    estimated_curves,
-)
-from .text_blocks import (
-    not_read,
-)
+from .residuals import EstimatedCurve, LackOfFit, Residual, estimated_curves
+from .text_blocks import not_read
 
 if TYPE_CHECKING:
     from ballplate.simulator.experiment.model import Experiment

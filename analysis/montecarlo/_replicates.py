@@ -26,7 +26,7 @@ from ballplate.simulator.estimation.gauss_newton import Solution
 from ballplate.simulator.geometry.motions import cross_matrices, vector_from_rotation
 from ballplate.simulator.machines.protocol import Array, Integers
 
-from .reference import PositionReadings, Reference, complete_fit
+from ._reference import PositionReadings, Reference, complete_fit
 
 # Replicates of a batch: constant, since the size of a matrix product affects its last bits.
 BATCH = 128

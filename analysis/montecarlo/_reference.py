@@ -19,7 +19,7 @@ from ballplate.simulator.estimation.linearisation import Linearisation, linearis
 from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers
 from ballplate.simulator.readings.simulated import true_readings
 
-from .expansion import Direct, LocalModel, expand
+from ._expansion import Direct, LocalModel, expand
 
 # Largest error, in standard uncertainties of a reading, of an expanded model.
 FAITHFUL = 1e-8

@@ -15,8 +15,8 @@ from itertools import product
 import numpy as np
 from ballplate.simulator.geometry.ball_layouts import even_grid
 
+from ._basis_settings import VARIABLES, RadialName
 from .bases import Basis, Monomial, Quoted, whole_values
-from .basis_settings import VARIABLES, RadialName
 from .protocol import Array
 
 

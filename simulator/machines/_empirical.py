@@ -18,9 +18,9 @@ import numpy as np
 from ballplate.simulator.geometry.ball_layouts import even_grid
 from ballplate.simulator.geometry.motions import cross_matrices
 
+from ._rigid_chain import rotation_and_derivatives
+from ._terms import Terms
 from .protocol import Array, Line, Parameter, Reported, Unit
-from .rigid_chain import rotation_and_derivatives
-from .terms import Terms
 
 FUNCTIONS = {
     "EX": "error in X",

@@ -8,21 +8,11 @@ from typing import TYPE_CHECKING, Any
 from ballplate.presentation.formatting import Data, given, picked
 from ballplate.presentation.table_columns import table_lines
 
-from .adjustments import (
-    adjustment_data,
-    adjustment_lines,
-    freedom_words,
-)
-from .estimates import (
-    ESTIMATE_COLUMNS,
-    labels,
-)
-from .fit_findings import FitFindings
+from ._fit_findings import FitFindings
+from .adjustments import adjustment_data, adjustment_lines, freedom_words
+from .estimates import ESTIMATE_COLUMNS, labels
 from .plates import plate_data, plate_table
-from .residuals import (
-    Residual,
-    residual_groups,
-)
+from .residuals import Residual, residual_groups
 from .text_blocks import (
     iteration_lines,
     map_lines,
