@@ -1,5 +1,5 @@
 """The keys of an experiment file: forms, units and ranges. References between them are checked in
-`checks`.
+`_checks`.
 """
 
 from __future__ import annotations

@@ -212,7 +212,7 @@ def empirical_model(
     :raises ValueError: a condition has several such terms.
 
     >>> from .bases import Polynomial
-    >>> from .terms import sums
+    >>> from ._terms import sums
     >>> len(empirical_model(sums(Polynomial(3)), (0, 0, 0), (1, 1, 1)).parameters)
     87
     """

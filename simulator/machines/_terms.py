@@ -25,6 +25,7 @@ class Products:
     """Products of univariate functions: `factors` (terms, 3) index 1, t and the interior functions
     of an axis.
 
+    >>> from .spline_basis import Spline
     >>> sums(Spline(3)).names[:8]
     ('1', 'x', 'y', 'z', 'x*y', 'x*z', 'y*z', 's1(x)')
     """
@@ -113,6 +114,7 @@ def sums(*bases: Basis) -> Products:
 
     `bases` are one family for all axes or those of x, y and z.
 
+    >>> from .spline_basis import Spline
     >>> sums(Spline(3), Monomial(2), Monomial(2)).names[7:]
     ('s1(x)', 's1(x)*y', 's1(x)*z')
     """
@@ -133,6 +135,7 @@ def sums(*bases: Basis) -> Products:
 def univariate(*bases: Basis) -> Products:
     """Return plain sums of univariate functions: 1, x, y, z and the interior functions of each.
 
+    >>> from .spline_basis import Spline
     >>> univariate(Spline(3)).names
     ('1', 'x', 'y', 'z', 's1(x)', 's1(y)', 's1(z)')
     """

@@ -240,7 +240,7 @@ READERS = {
 }
 
 # What writes tables.
-WRITERS = {"simulator/inputs/decoding.py"}
+WRITERS = {"simulator/inputs/writing.py"}
 
 
 def test_no_other_place_reads_a_table() -> None:

@@ -1,1 +1,1 @@
-"""Classes of observations: one file each, entered in `kinds`."""
+"""Classes of observations: one file each; calibrations are listed in `experiment.calibrations`."""
