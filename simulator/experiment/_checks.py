@@ -9,15 +9,14 @@ import numpy as np
 from ballplate.simulator.design.observations.calibration import Calibration
 from ballplate.simulator.design.observations.distances import DistanceCalibration, RadiusCalibration
 from ballplate.simulator.geometry.artefacts import BryanGaugeSettings, TwoSpheresSettings
-from ballplate.simulator.inputs.messages import ExperimentError, Steps
+from ballplate.simulator.inputs.messages import Steps
 from ballplate.simulator.inputs.problems import Problems, written_texts
 from ballplate.simulator.inputs.quantities import QuantityError, parse_positive_length
 from ballplate.simulator.inputs.settings import hint, listing
 from ballplate.simulator.inputs.units import LENGTH_UNITS, plain_unit
 
 from .model import Position
-from .own_sections import needed_service
-from .readings_section import ColumnsSettings, CompensationSettings, ReadingsSettings, check_rule
+from .readings_section import ColumnsSettings, ReadingsSettings, check_rule
 from .references import References
 from .validation import Sections
 
@@ -224,7 +223,6 @@ def check_readings(sections: Sections, references: References) -> None:
     if offsets and settings.coordinates not in ("ball centres", "part"):
         text = "applies to coordinates: ball centres, or part; add it, or leave this out"
         problems.add(("readings", "offsets_in_controller"), text)
-    _read_correction(settings, references)
 
 
 def _check_constants(columns: ColumnsSettings, references: References) -> None:
@@ -259,22 +257,3 @@ def _check_probes(names: list[str], steps: Steps, references: References) -> Non
         if name not in references.probes:
             text = f'unknown probe "{name}"; {hint(name, references.probes)}'
             references.problems.add((*steps, name), text, True)
-
-
-def _read_correction(settings: ReadingsSettings, references: References) -> None:
-    """Set a correction to subtract to that of its machine file."""
-    correction = settings.compensation
-    if not isinstance(correction, CompensationSettings):
-        return
-    steps = ("readings", "compensation", "file")
-    if references.dimension == 2:
-        text = "a machine file has 3 dimensions, but machine.volume has 2"
-        references.problems.add(steps, text)
-        return
-    read = needed_service("machine_of_file", steps, references.problems)
-    if read is None:
-        return
-    try:
-        correction.set_machine(read(references.file(correction.file), references.trust))
-    except ExperimentError as error:
-        references.problems.take(error, steps)

@@ -17,7 +17,7 @@ from ballplate.simulator.inputs.yamltree import written
 
 from ._artefacts import resolve_references
 from ._checks import check_calibration_read, check_names, check_radii, check_readings, check_use
-from ._error_model_checks import check_true_machine, with_usable_error_model
+from ._error_models import with_machines
 from ._influences import resolve_influences
 from ._probes import resolve_probes, resolve_stars
 from .bounds import Bounds, check_inside, resolve_bounds
@@ -74,8 +74,7 @@ def resolve(
         references = replace(references, volume=machine.volume)
     probes = resolve_probes(sections, references)
     bounds = resolve_bounds(sections, machine, probes, references)
-    sections = with_usable_error_model(sections, machine, references)
-    check_true_machine(sections, machine, references)
+    sections = with_machines(sections, machine, references)
     for steps in sections.invalid:
         if steps[0] in ("positions", "calibration"):
             references.check_written(steps)

@@ -26,10 +26,6 @@ class CompensationSettings(Settings):
     # That of the file; set when the experiment is loaded.
     _machine: TrueMachine | None = PrivateAttr(default=None)
 
-    def set_machine(self, machine: TrueMachine) -> None:
-        """Set the machine of the file."""
-        self._machine = machine
-
     def machine(self) -> TrueMachine:
         """What the correction added to scale readings."""
         assert self._machine is not None

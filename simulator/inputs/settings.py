@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterable
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, Self, TypeVar
 
 from pydantic import (
     BaseModel,
@@ -79,6 +79,13 @@ class Settings(BaseModel):
     def stated(self) -> dict[str, Any]:
         """Values that are not None, by the names of their fields."""
         return {key: value for key, value in self if value is not None}
+
+    def completed(self, **content: Any) -> Self:
+        """Return a copy with content of files that the settings name, by private attribute."""
+        copy = self.model_copy()
+        for name, value in content.items():
+            setattr(copy, name, value)
+        return copy
 
 
 def listing(words: Iterable[str], limit: int = 8) -> str:

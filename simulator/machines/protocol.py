@@ -147,8 +147,9 @@ class ErrorModelKind:
     `build` makes the model from `settings` for a volume between two corners in metres;
     `dimensions` lists the possible numbers of co-ordinates. `wrong` returns faults of the settings
     for a number of dimensions as (path in the settings, text) pairs; `with_defaults` states
-    defaults that depend on this number. `read` completes the settings from files, found from the
-    folder of the experiment; it raises ExperimentError. What `is_code` is run to be built.
+    defaults that depend on this number. `read` returns the settings completed from files, which are
+    found from the folder of the experiment; it raises ExperimentError. What `is_code` is run to be
+    built.
     """
 
     settings: type[Settings]
@@ -156,5 +157,5 @@ class ErrorModelKind:
     dimensions: tuple[int, ...] = (2, 3)
     wrong: Callable[[Any, int], Iterable[tuple[Steps, str]]] = lambda settings, dimension: ()
     with_defaults: Callable[[Any, int], Settings] = lambda settings, dimension: settings
-    read: Callable[[Any, Path, Trust], None] = lambda settings, folder, trust: None
+    read: Callable[[Any, Path, Trust], Any] = lambda settings, folder, trust: settings
     is_code: bool = False

@@ -63,8 +63,8 @@ class RandomSettings(Settings):
 
 
 class FurtherTrueMachine(Settings):
-    """A true machine that an extension provides, in a module whose `read` completes it from its
-    files and reports faults.
+    """A true machine that an extension provides, in a module whose `read` returns it completed from
+    its files and reports faults.
     """
 
     def true_machine(self, fitted: ErrorModel, lower: Corner, upper: Corner) -> TrueMachine:

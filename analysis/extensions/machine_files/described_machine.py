@@ -57,15 +57,17 @@ class TrueMachineFileSettings(FurtherTrueMachine):
 SETTINGS = TrueMachineFileSettings
 
 
-def read(truth: TrueMachineFileSettings, machine: Machine | None, references: References) -> None:
-    """Let the true machine be that of its file, or report its faults."""
+def read(
+    truth: TrueMachineFileSettings, machine: Machine | None, references: References
+) -> TrueMachineFileSettings:
+    """Return the true machine with that of its file; faults go to the problems."""
     steps, doubts = ("true_machine", "file"), references.problems.doubts
     try:
         true_machine = load_machine(references.file(truth.file), doubts, references.trust)
     except ExperimentError as error:
         references.problems.take(error, steps)
-        return
-    truth._machine = true_machine
+        return truth
+    truth = truth.completed(_machine=true_machine)
     random = random_part(true_machine)
     if random and truth.random_part is None:
         text = (
@@ -75,7 +77,7 @@ def read(truth: TrueMachineFileSettings, machine: Machine | None, references: Re
         )
         references.problems.add(steps, text)
     if machine is None:
-        return
+        return truth
     level = truth.level
     if level is not None and machine.dimension == 3:
         references.problems.add(("true_machine", "level"), "is for two dimensions; remove it")
@@ -87,3 +89,4 @@ def read(truth: TrueMachineFileSettings, machine: Machine | None, references: Re
         references.problems.add(("true_machine", "level"), text)
     d = machine.dimension
     check_within(true_machine.lower[:d], true_machine.upper[:d], machine, steps, references)
+    return truth

@@ -44,8 +44,9 @@ class MachineFileSettings(Settings):
     _machine: MachineDescription | None = PrivateAttr(default=None)
 
 
-def _read(settings: MachineFileSettings, folder: Path, trust: Trust) -> None:
-    settings._machine = load_machine(trust.file(folder, settings.file), trust=trust)
+def _read(settings: MachineFileSettings, folder: Path, trust: Trust) -> MachineFileSettings:
+    machine = load_machine(trust.file(folder, settings.file), trust=trust)
+    return settings.completed(_machine=machine)
 
 
 def _build(settings: MachineFileSettings, lower: Corner, upper: Corner) -> ErrorModel:

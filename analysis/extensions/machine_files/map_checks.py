@@ -124,7 +124,7 @@ def _model(
         )
         return None
     try:
-        kind.read(model_settings, folder, trust)
+        model_settings = kind.read(model_settings, folder, trust)
         wrong = list(kind.wrong(model_settings, d))
         for below, text in wrong:
             problems.add(("error_model", *below), text)

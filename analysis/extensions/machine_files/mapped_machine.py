@@ -44,19 +44,21 @@ class TrueMapSettings(FurtherTrueMachine):
 SETTINGS = TrueMapSettings
 
 
-def read(truth: TrueMapSettings, machine: Machine | None, references: References) -> None:
-    """Let the true machine be that of its map, or report its faults."""
+def read(
+    truth: TrueMapSettings, machine: Machine | None, references: References
+) -> TrueMapSettings:
+    """Return the true machine with that of its map; faults go to the problems."""
     steps = ("true_machine", "file")
     true_map = read_named(truth.file, steps, references)
     if true_map is None:
-        return
+        return truth
     a = true_map.values
     if truth.draw is not None:
         generator = np.random.default_rng(np.random.SeedSequence(truth.draw))
         root = true_map.root
         a = a + (root @ generator.standard_normal(root.shape[1]))[: len(a)]
     content = hashlib.sha256(read_bytes(references.file(truth.file))).hexdigest()
-    truth._machine, truth._content = TrueMachine(true_map.model, a), content
+    truth = truth.completed(_machine=TrueMachine(true_map.model, a), _content=content)
     if true_map.undetermined.shape[1]:
         text = (
             f"has {true_map.undetermined.shape[1]} undetermined directions, in which the true"
@@ -64,9 +66,10 @@ def read(truth: TrueMapSettings, machine: Machine | None, references: References
         )
         references.problems.doubt(steps, text)
     if machine is None:
-        return
+        return truth
     if machine.dimension != true_map.dimension:
         text = f"is of {true_map.dimension} axes, but machine.volume of {machine.dimension}"
         references.problems.add(steps, f"{text}; name another map")
-        return
+        return truth
     check_within(*true_map.volume.corners, machine, steps, references)
+    return truth

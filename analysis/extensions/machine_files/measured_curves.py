@@ -49,10 +49,6 @@ class CurvesSettings(FurtherTrueMachine):
     # Curves by ISO 230-1 name; set when the experiment is loaded.
     _curves: dict[str, Points] = PrivateAttr(default_factory=dict)
 
-    def set_curves(self, curves: dict[str, Points]) -> None:
-        """Set the curves of the files."""
-        self._curves = curves
-
     def true_machine(self, fitted: ErrorModel, lower: Corner, upper: Corner) -> TrueMachine:
         """Return the curves as an error model whose parameters are all one."""
         model = curves_model(
@@ -69,8 +65,8 @@ class CurvesSettings(FurtherTrueMachine):
 SETTINGS = CurvesSettings
 
 
-def read(truth: CurvesSettings, machine: Machine | None, references: References) -> None:
-    """Let the true machine have the curves of its files, or report its faults."""
+def read(truth: CurvesSettings, machine: Machine | None, references: References) -> CurvesSettings:
+    """Return the true machine with the curves of its files; faults go to the problems."""
     problems, curves = references.problems, dict[str, Points]()
     for i, file in enumerate(truth.files):
         steps = ("true_machine", "files", i)
@@ -106,4 +102,4 @@ def read(truth: CurvesSettings, machine: Machine | None, references: References)
                 " it"
             )
             problems.add(steps, text)
-    truth.set_curves(curves)
+    return truth.completed(_curves=curves)

@@ -37,12 +37,13 @@ class PythonSettings(Settings):
     _folder: Path | None = PrivateAttr(default=None)
     _trust: Trust = PrivateAttr(default=UNKNOWN)
 
-    def beside(self, folder: Path, trust: Trust) -> None:
-        """Search modules also in the experiment file's folder, or the stated one relative to
-        it.
-        """
-        self._folder = folder if self.folder is None else folder / self.folder
-        self._trust = trust
+
+def _read(settings: PythonSettings, folder: Path, trust: Trust) -> PythonSettings:
+    """Return the settings with the folder of modules: that of the experiment file, or the stated
+    one relative to it.
+    """
+    place = folder if settings.folder is None else folder / settings.folder
+    return settings.completed(_folder=place, _trust=trust)
 
 
 def _build(settings: PythonSettings, lower: Corner, upper: Corner) -> ErrorModel:
@@ -52,4 +53,4 @@ def _build(settings: PythonSettings, lower: Corner, upper: Corner) -> ErrorModel
 
 
 SETTINGS = PythonSettings
-ERROR_MODEL = ErrorModelKind(PythonSettings, _build, read=PythonSettings.beside, is_code=True)
+ERROR_MODEL = ErrorModelKind(PythonSettings, _build, read=_read, is_code=True)
