@@ -1,4 +1,6 @@
-"""The spine: files in reading order, which are held to what `check`, `run` and `fit` enter."""
+"""The spine: files in reading order, held to what `check`, `run` and `fit` enter; what `check` loads;
+and how often loading moves between rooms.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +15,10 @@ TOP = Path(__file__).parents[1]
 MOST_FILES = 45
 # Of the nodes of the kernel's functions that the three commands enter.
 LEAST_SHARE = 0.6
+# Of ballplate's own, which `check` of the quickstart loads.
+MOST_MODULES, MOST_NODES = 130, 140_000
+# Calls from one folder into another while the quickstart is loaded.
+MOST_MOVES = 90
 
 # Code objects are kept by their first line, which is that of the first decorator.
 ENTERED = """
@@ -73,3 +79,58 @@ def test_the_spine_is_what_commands_enter(tmp_path: Path) -> None:
     entered = {name: nodes(TOP / name, lines[name]) for name in kernel}
     assert not [name for name in spine if not entered.get(name)]
     assert sum(entered[name] for name in spine) >= LEAST_SHARE * sum(entered.values())
+
+
+LOADED = """
+import contextlib, io, json, sys
+from ballplate.cli import main
+
+with contextlib.redirect_stdout(io.StringIO()):
+    assert main(["check", "designs/quickstart.yaml"]) == 0
+modules = [m for name, m in sys.modules.items() if name.split(".")[0] == "ballplate"]
+json.dump([m.__file__ for m in modules if getattr(m, "__file__", None)], sys.stdout)
+"""
+
+MOVES = """
+import sys
+from pathlib import Path
+import ballplate as bp
+
+top, rooms, moves = Path.cwd(), {}, []
+
+def room_of(name):
+    path = Path(name)
+    if not path.is_relative_to(top) or "site-packages" in path.parts:
+        return None
+    return path.relative_to(top).parts[:2]
+
+def follow(frame, event, argument):
+    name = frame.f_code.co_filename
+    room = rooms.setdefault(name, room_of(name))
+    if event == "call" and room and frame.f_code.co_name != "<module>":
+        if moves[-1:] != [room]:
+            moves.append(room)
+
+bp.quickstart()
+sys.setprofile(follow)
+bp.load("designs/quickstart.yaml")
+sys.setprofile(None)
+print(len(moves))
+"""
+
+
+def printed(code: str) -> str:
+    done = subprocess.run([sys.executable, "-c", code], cwd=TOP, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_check_loads_few_modules() -> None:
+    files = [Path(name) for name in json.loads(printed(LOADED))]
+    trees = [ast.parse(path.read_text(encoding="utf-8")) for path in files]
+    assert 0 < len(files) <= MOST_MODULES
+    assert sum(1 for tree in trees for _ in ast.walk(tree)) <= MOST_NODES
+
+
+def test_loading_goes_down_and_not_up_and_down() -> None:
+    assert 0 < int(printed(MOVES)) <= MOST_MOVES
