@@ -79,6 +79,8 @@ def _put(solution: Array, order: Integers | None) -> Array:
     return result
 
 
+# Written out, since a loop over two or three rows with all balls in one array is faster than a call
+# of LAPACK for each ball.
 def _by_substitution(root: Array, side: Array) -> Array:
     """Solve upper triangular systems (n, d, d) for sides (n, d, m)."""
     d = root.shape[1]
@@ -163,6 +165,8 @@ class Spectrum:
         """
         if self.triangle is None:
             return self.principal_root
+        # Any root of the covariance gives the same uncertainties. This one needs no singular
+        # vectors.
         return self.scale[:, None] * np.linalg.inv(self.triangle)
 
 
@@ -175,10 +179,15 @@ def spectrum(factor: Factor, drawn: Spectrum | None = None) -> Spectrum:
     given `drawn` spectrum supplies rank and null space: information on its null directions is
     omitted, and no other direction is one.
     """
+    # Singular values of columns in metres, radians and ratios would change with the units, and so
+    # would the count of small ones. In their effect on points the columns compare, and a threshold
+    # relative to the largest value has one meaning for all designs.
     scale = factor.layout.scale * MICROMETRE
     if drawn is None:
         judged = factor if factor.alike is None else factor.alike
         scaled = judged.root * scale
+        # Values first: at full rank, the usual case, the vectors are computed only if something
+        # asks for them.
         values = np.asarray(svd(scaled, compute_uv=False), float)
         # Where nothing shared is determined, all values are rounding, of what the balls' rows have
         # carried away.
@@ -199,9 +208,12 @@ def spectrum(factor: Factor, drawn: Spectrum | None = None) -> Spectrum:
         right = svd(scaled)[2]
         if judged is factor:
             return Spectrum(values, scale, deficiency, gap, known=scale[:, None] * right.T)
+        # The rows of about equal weights decide which directions are open. The true weights are
+        # applied below, within the rest of the space only.
         null = right[rank:].T
     else:
         null, deficiency, gap = drawn.null / scale[:, None], drawn.deficiency, drawn.gap
+    # An orthonormal basis of all directions across the open ones, in scaled parameters.
     spanned = np.linalg.qr(null, mode="complete")[0][:, deficiency:]
     values, directions = _determined(factor, scale, spanned)
     # Rounding alone is left of what counts as zero.
@@ -226,6 +238,9 @@ def _determined(factor: Factor, scale: Array, spanned: Array) -> tuple[Array, Ar
         return values, spanned @ right.T
     # The heaviest rows would take all digits of the smallest singular values, but the inverse has
     # these first.
+    # With the triangle T, whose columns are permuted, the matrix sought is Q T P'. The left
+    # singular vectors of P T^-1 are its right ones, and singular values are reciprocal, so that
+    # their order turns round.
     determined = triangle(in_order(factor) * scale @ spanned, np.zeros((len(scale), 0)))
     inverse = scipy_linalg().solve_triangular(
         determined.root, np.eye(len(determined.root)), check_finite=False
@@ -273,6 +288,11 @@ def ball_covariance(design: Design, factor: Factor, spectrum: Spectrum) -> BallC
     ball = np.zeros((n, d, rank + k))
     covariances = np.zeros((n, d, d))
     ball_null = np.zeros((n, d, nulls))
+    # The three rows of a ball are R y + S t = z + e, with the shared parameters t and noise e of
+    # unit variance, which no other row has: y = R^-1 (z + e - S t). The covariance of the ball is
+    # the sum of two independent parts: R^-1 S G of the shared root G, which correlates balls with
+    # one another, and R^-1 of its own rows. Undetermined directions move the ball by -R^-1 S as
+    # well.
     carried = -solve_balls(factor, factor.ball_shared)
     rows = carried.reshape(d * len(carried), carried.shape[2])
     ball[factor.eliminated, :, :rank] = (rows @ shared).reshape(len(carried), d, rank)
@@ -281,6 +301,8 @@ def ball_covariance(design: Design, factor: Factor, spectrum: Spectrum) -> BallC
         factor, np.broadcast_to(np.eye(d), factor.ball_root.shape)
     )
     if k:
+        # Kept balls share one triangle, and the part of their own rows correlates them too: it gets
+        # columns in `common`. The minus before the identity meets that before the solution.
         sides = np.concatenate(
             [factor.kept_shared @ shared, factor.kept_shared @ null, -np.eye(k)], axis=1
         )

@@ -110,6 +110,8 @@ def _gathered(design: Design, state: State, x: Array | None) -> _Gathered:
         if len(observation):
             balls = observation.balls
             width = balls.shape[1]
+            # The number of balls in a row decides when it is used: with none at the end, with one
+            # in the batch of that ball, with several after all batches.
             sorted_[min(width, 2)].append((balls, observation.rows(design, state, x)))
     shared, single, tied = sorted_
     return _Gathered(
@@ -145,8 +147,11 @@ def _eliminate_alike(design: Design, layout: SharedLayout, state: State, x: Arra
     total = 0.0
     roots, tops = [], []
     order = []
+    # Tied balls go through the batches too. Their own rows shrink to d each, so that the large
+    # triangle of what ties them never holds a reading.
     every = np.concatenate([single, balls_kept])
     for balls, by_ball, by_rest in _batches(design, layout, state, x, every, gathered.single):
+        # S^2 at the point of linearisation, before the ball takes its share of the residuals.
         total += float((by_rest[:, :, -1] ** 2).sum())
         q, r = np.linalg.qr(by_ball)
         top = q.transpose(0, 2, 1) @ by_rest
@@ -168,6 +173,9 @@ def _eliminate_alike(design: Design, layout: SharedLayout, state: State, x: Arra
     columns = d * len(balls_kept)
     # Triangular already but for the rows of tied balls, which are absorbed some at a time: there
     # may be far more than columns.
+    # The residual is the last column, so that the transformations make the right-hand side of it.
+    # The last diagonal element is then the root of the sum of squares that no step can remove. It
+    # is not kept.
     triangle = np.zeros((columns + s + 1, columns + s + 1), order="F")
     for place, root_of_ball in enumerate(root[is_kept]):
         triangle[d * place : d * place + d, d * place : d * place + d] = root_of_ball
@@ -201,6 +209,7 @@ def _differ(design: Design, state: State) -> bool:
             if len(observation)
         ),
     ]
+    # Zero marks what is not read, such as the co-ordinate across a hole plate, and is no weight.
     weights = [some[some > 0.0] for some in weights]
     largest = max(float(some.max(initial=0.0)) for some in weights)
     smallest = min(float(some.min(initial=np.inf)) for some in weights)
@@ -209,6 +218,8 @@ def _differ(design: Design, state: State) -> bool:
 
 def _weighted_alike(design: Design, state: State) -> Design:
     """The same observations with weights of about one each."""
+    # The rank needs no true weights, only comparable ones: W J v = 0 if and only if J v = 0.
+    # Repeats are a weight as well.
     readings = replace(
         design.readings, uncertainty=None, repeats=np.ones_like(design.readings.repeats)
     )
@@ -234,6 +245,8 @@ def _eliminate_graded(
     balls_kept, gathered = design.tied_balls, _gathered(design, state, x)
     place_of = _places(design, balls_kept)
     columns = d * len(balls_kept)
+    # Pivots are chosen by the size of columns, so that metres, radians and ratios are first brought
+    # to the same effect on points. The residual has no column to be compared.
     scale = np.append(layout.scale, 1.0)
     single = np.setdiff1d(design.plate_balls, balls_kept, assume_unique=True)
     balls, roots, orders, tops = [], [], [], []
@@ -242,6 +255,8 @@ def _eliminate_graded(
         for batch, by_ball, by_rest in _batches(design, layout, state, x, chosen, gathered.single):
             total += float((by_rest[:, :, -1] ** 2).sum())
             by_rest *= scale
+            # Rows come whitened, and the size of their derivatives is their weight. The residual
+            # has no part in it: data must not change the order of elimination.
             weights = np.maximum(
                 np.abs(by_ball).max(axis=2), np.abs(by_rest[:, :, :-1]).max(axis=2, initial=0.0)
             )
@@ -250,6 +265,9 @@ def _eliminate_graded(
             if is_tied:
                 rows = np.zeros((len(batch), d, columns + s + 1))
                 ball, row = np.ogrid[: len(batch), :d]
+                # Each root has the columns of its ball in the order of its own pivots. Here they
+                # return to their places, since the triangle of all tied balls chooses its order
+                # anew.
                 for axis in range(d):
                     rows[ball, row, (d * place_of[batch] + order[:, axis])[:, None]] = root[
                         :, :, axis
@@ -332,6 +350,8 @@ def _absorbed(triangle: Array, rows: Array) -> Array:
     if len(rows) < ROWS_AT_ONCE // 2:
         return _triangle(np.concatenate([triangle, rows]))
     # Three times as fast on many rows, which pay for the time that it takes to import.
+    # Householder transformations of rows below a triangle leave its zeros alone. A decomposition of
+    # both stacked does not know that they are zeros.
     above = np.asfortranarray(_square(triangle, rows.shape[1]))
     return np.triu(_by_panels(above, np.asfortranarray(rows), PANEL))
 
@@ -351,6 +371,7 @@ def _by_panels(triangle: Array, rows: Array, panel: int) -> Array:
     """
     reduced: Array
     dtpqrt = scipy_linalg().lapack.dtpqrt
+    # The first argument says that no part of the rows is triangular.
     reduced, _, _, _ = dtpqrt(
         0, min(panel, len(triangle)), triangle, rows, overwrite_a=1, overwrite_b=1
     )
@@ -403,6 +424,8 @@ def _batches(
     ]
     known_rest = np.concatenate([np.zeros((0, s + 1 if is_mixed else 1)), *beside])
 
+    # A batch is one array, padded to its longest ball. Sorted by their number of rows, the balls of
+    # a batch need little padding.
     rows = d * count + extra
     balls = balls[np.argsort(rows[balls], kind="stable")]
     row = 0
@@ -411,9 +434,13 @@ def _batches(
         batch = balls[row : row + max(ROWS_AT_ONCE // most, 1)]
         row += len(batch)
         m, c = int(count[batch].max(initial=0)), int(extra[batch].max(initial=0))
+        # At least d rows, so that the decomposition has a square root for every ball. Rows of zeros
+        # change no triangle.
         by_ball = np.zeros((len(batch), max(d * m + c, d), d))
         by_rest = np.zeros((len(batch), max(d * m + c, d), s + 1))
         present = np.arange(m) < count[batch][:, None]
+        # The first reading of all stands in for those that a ball does not have; `_fill` clears its
+        # rows.
         reading_index = np.where(present, start[batch][:, None] + np.arange(m), 0)
         if m:
             index = chosen[reading_index.ravel()]
@@ -451,6 +478,8 @@ def _fill(by_ball, by_rest, blocks, columns, layout, present) -> None:  # type: 
     if blocks.by_offset is not None:
         by_column = np.concatenate([by_column, blocks.by_offset], axis=2)
     by_pose = by_column.reshape(b, m, d, -1)[ball, place]
+    # A reading has each column once, so that plain assignment, without `np.add.at`, is enough. Held
+    # parameters have no column, and their derivatives are dropped.
     for j in range(columns.shape[1]):
         free = used[:, j] >= 0
         flat[ball[free], place[free], :, used[free, j]] = by_pose[free, :, j]

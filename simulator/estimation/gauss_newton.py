@@ -96,6 +96,7 @@ def iterate(
     length, previous = 0.0, np.inf
     status: Status = "not converged"
     while True:
+        # A diverging iteration overflows, which is a status and no warning.
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             factor = eliminate(design, layout, state, x)
         record.append(Iteration(length, factor.sum_of_squares))
@@ -104,6 +105,8 @@ def iterate(
             status = "diverged"
             break
         found_spectrum = spectrum(factor, held_spectrum)
+        # After the last step the observations are eliminated once more: the factor, spectrum and
+        # S^2 of the solution are those at its own state.
         if status == "converged" or len(record) > settings.iterations:
             break
         shared, balls = newton_step(design, factor, found_spectrum)
@@ -135,6 +138,7 @@ def estimate(design: Design, x: Array, settings: GaussNewtonSettings | None = No
     start = initial_state(design, x)
     drawn = as_drawn(design)
     solution_held = iterate(design, x, start, settings, drawn)
+    # With lengths of standards the least S^2 may be where all lengths are zero, see `as_drawn`.
     if not drawn.deficiency or len(design.of(Lengths)):
         return solution_held
     followed = iterate(design, x, start, settings)
@@ -145,6 +149,7 @@ def estimate(design: Design, x: Array, settings: GaussNewtonSettings | None = No
         design, solution_held, followed, drawn.deficiency
     ):
         return solution_held
+    # The readings lead to another state, but uncertainties stay those of the nominal rank.
     return replace(followed, spectrum=spectrum(followed.factor, drawn))
 
 
@@ -193,6 +198,7 @@ def newton_step(design: Design, factor: Factor, spectrum: Spectrum) -> tuple[Arr
     """The least-squares step: shared parameters (s,) and balls (n, d)."""
     shared = _shared_step(factor, spectrum)
     balls = np.zeros((len(design.balls.names), design.dimension))
+    # Back-substitution: with the shared step known, the three rows of each ball give its own.
     side = factor.ball_side + factor.ball_shared @ shared
     balls[factor.eliminated] = -solve_balls(factor, side[:, :, None])[:, :, 0]
     if len(factor.kept):
@@ -212,6 +218,8 @@ def _shared_step(factor: Factor, spectrum: Spectrum) -> Array:
         return -(spectrum.root @ (rest_root.T @ factor.side))
     from .graded import triangle
 
+    # Least squares within the determined directions alone, so that no step follows an open one. The
+    # rows differ in weight, and keep their order by it.
     reduced = triangle(in_order(factor) @ determined, factor.side[:, None])
     steps = scipy_linalg().solve_triangular(reduced.root, reduced.side[:, 0], check_finite=False)
     return -(determined[:, reduced.order] @ steps)

@@ -46,6 +46,8 @@ def triangle(rows: Array, sides: Array) -> Triangle:
     m).
     """
     n = rows.shape[1]
+    # Both orders are needed: the heaviest rows first, once, and at every step the largest remaining
+    # column, which `dgeqp3` chooses.
     sorted_ = np.argsort(-np.abs(rows).max(axis=1, initial=0.0), kind="stable")
     rows, sides = rows[sorted_], sides[sorted_]
     if len(rows) < n:
@@ -73,6 +75,9 @@ class Collected:
         """Add rows (k, columns + sides)."""
         self._waiting.append(rows[rows.any(axis=1)])
         if sum(map(len, self._waiting)) > COLLECTED * max(self._columns, 64):
+            # A triangle stands for all rows that it came from, with their weights, and is sorted
+            # among the next rows like any other. What is left below it has no columns any more and
+            # is final.
             reduced = self._reduced()
             self._waiting = [np.concatenate([reduced.rows, reduced.side], axis=1)]
             self._rest.append(reduced.rest)
@@ -97,6 +102,8 @@ def without_balls(
     rest of its rows (b, d, c), and the remaining rows (b, m - d, c).
     """
     b, m, d = by_ball.shape
+    # The same as `triangle` does, for all balls of a batch at once: LAPACK would be called once per
+    # ball. Each ball has pivots of its own, since the heaviest rows of each may be along another axis.
     heaviest = np.argsort(-weights, axis=1, kind="stable")[:, :, None]
     by_ball, by_rest = (
         np.take_along_axis(by_ball, heaviest, 1),
@@ -107,13 +114,16 @@ def without_balls(
     for step in range(d):
         size = (by_ball[:, step:, step:] ** 2).sum(axis=1)
         pivot = step + size.argmax(axis=1)
+        # The transpose is a view: columns are exchanged as entries of `order` are.
         for array in (by_ball.transpose(0, 2, 1), order):
             here, there = array[ball, step].copy(), array[ball, pivot].copy()
             array[ball, step], array[ball, pivot] = there, here
         column = by_ball[:, step:, step].copy()
         length = np.sqrt((column**2).sum(axis=1))
+        # Householder's vector, with the sign that adds: a difference would lose digits.
         column[:, 0] += np.where(column[:, 0] < 0.0, -length, length)
         square = (column**2).sum(axis=1)
+        # A column of zeros has no direction, and is left as it is.
         half = np.where(square > 0.0, 2.0 / np.where(square > 0.0, square, 1.0), 0.0)
         for array in (by_ball[:, step:, step:], by_rest[:, step:]):
             array -= (

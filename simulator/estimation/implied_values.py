@@ -55,6 +55,8 @@ def implied_count(design: Design, state: State) -> int:
         artefacts.append(design.balls.artefact[balls[:, 0]])
     matrix, residual = vstack(blocks, format="csr"), np.concatenate(residuals)
     of_kind, artefact = np.concatenate(numbers), np.concatenate(artefacts)
+    # Each kind is judged on its own as well as all together: values of one kind may be computed
+    # from one another, while the errors of another kind hide that in the common sum.
     count = 0
     for one in np.unique(artefact):
         here = artefact == one
@@ -69,8 +71,13 @@ def _implied(matrix: csr_array, residual: Array) -> int:
     from scipy.sparse.linalg import lsmr
     from scipy.special import chdtr
 
+    # Least squares of the balls' places, with certified values only. Independent errors leave a sum
+    # of squares with the chi-squared distribution, of as many degrees of freedom as there are
+    # values beyond the rank. A sum so small that measured values have it in one of a hundred cases
+    # means values that were computed from others. These add no degrees of freedom.
     matrix = matrix[:, np.flatnonzero(np.abs(matrix).sum(axis=0) > 0.0)]
     sizes = np.sqrt(matrix.power(2).sum(axis=1))
+    # Rows of unit length: the rank must not depend on uncertainties that differ widely.
     unit = diags_array(1.0 / np.where(sizes > 0.0, sizes, 1.0)) @ matrix
     # Squares keep eight digits of the ratio of singular values, of which four are needed.
     squares = eigvalsh((unit.T @ unit).toarray())

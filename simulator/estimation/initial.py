@@ -38,6 +38,8 @@ def initial_state(design: Design, x: Array) -> State:
 
     Where too few balls join a position to the others, the nominal geometry closes the gap.
     """
+    # A star may have been turned against its nominal orientation, which would shift every location
+    # that follows by the error of the offsets.
     for observation in design.observations:
         design = observation.as_read(design, x)
     d = design.dimension
@@ -59,6 +61,8 @@ def initial_state(design: Design, x: Array) -> State:
                 balls[members[0]] = np.where(np.isnan(first), balls[members[0]], first)
             continue
         shape, poses = _assemble(means[places][:, members], design.balls.places[members], d)
+        # The shape is in the frame of one of the positions. The motion into the artefact's frame is
+        # applied to the balls, and taken out of every pose, so that R y + o stays as it is.
         turn, shift = _into_frame(design, shape, poses, places, members)
         if (
             _strength(
@@ -71,6 +75,7 @@ def initial_state(design: Design, x: Array) -> State:
         balls[members] = np.where(
             np.isnan(shape), design.balls.places[members], shape @ turn.T + shift
         )
+        # With y' = T y + s: R y + o = R T' y' + (o - R T' s).
         for place, (rotation, origin) in zip(places, poses, strict=True):
             rotations[place] = rotation @ turn.T
             origins[place] = origin - rotations[place] @ shift
@@ -126,6 +131,11 @@ def _assemble(locations: Array, nominal: Array, d: int) -> tuple[Array, list[tup
     """Shape (n, d) of an artefact in the frame of its best-read position, and the poses from
     there.
     """
+    # The shape grows from the position with most balls. At each step the position joins whose balls
+    # in common with the shape have the largest extent across their main line, since a pose from
+    # balls nearly in a line, or from two close to each other, would hand its error on to all later
+    # ones. Every ball is the mean of the positions that have joined so far. The result is no
+    # estimate, only near enough for Gauss-Newton steps to converge.
     present = ~np.isnan(locations[:, :, 0])
     first = int(present.sum(axis=1).argmax())
     shape = np.where(present[first][:, None], locations[first], np.nan)
@@ -134,6 +144,8 @@ def _assemble(locations: Array, nominal: Array, d: int) -> tuple[Array, list[tup
     waiting = [k for k in range(len(locations)) if k != first]
     while waiting:
         shared = [present[k] & ~np.isnan(shape[:, 0]) for k in waiting]
+        # Rounded, so that positions equally good by symmetry are taken in one order on every
+        # computer.
         choice = int(np.argmax(comparable([_strength(shape[s], d) for s in shared])))
         k, common = waiting.pop(choice), shared[choice]
         if _strength(shape[common], d) > 0:
@@ -155,6 +167,8 @@ def _strength(points: Array, d: int) -> float:
     if len(points) < 2:
         return 0.0
     extent = svd(points - points.mean(axis=0), compute_uv=False)
+    # In space a line of balls leaves the turn about it open, and the second extent decides. In the
+    # plane two balls are enough, and the first does.
     needed = extent[d - 2]
     return float(needed) if needed > FLAT * extent[0] else 0.0
 
@@ -163,6 +177,8 @@ def _by_nominal(locations: Array, shape: Array, nominal: Array) -> tuple[Array, 
     here, is_known = ~np.isnan(locations[:, 0]), ~np.isnan(shape[:, 0])
     if not here.any() or not is_known.any():
         return np.eye(locations.shape[1]), np.zeros(locations.shape[1])
+    # No balls in common fix the relative pose. Both sides are compared with the nominal artefact,
+    # each with the balls that it has.
     to_position, to_position_origin = fit_motion(nominal[here], locations[here])
     to_shape, to_shape_origin = fit_motion(nominal[is_known], shape[is_known])
     rotation = to_position @ to_shape.T
@@ -177,6 +193,9 @@ def _into_frame(
     members: Integers,
 ) -> tuple[Array, Array]:
     """Motion that takes the assembled shape into the artefact's own frame."""
+    # A held pose defines the frame: readings cannot distinguish a motion of the frame from the
+    # opposite motion of all poses. Otherwise certified co-ordinates do, and without enough of these
+    # the nominal ones.
     fixed = [k for k in places if design.positions.held[k].all()]
     if fixed:
         rotation, origin = poses[places.index(fixed[0])]
@@ -226,6 +245,8 @@ def _with_held(
     if not is_held.any() or is_held.all() or not is_certified.any():
         return turn, shift
     drawn = design.positions.rotations[position], design.positions.origins[position]
+    # Gauss-Newton for the six parameters of a motion (three in the plane). Certified co-ordinates
+    # and the held parameters of the first pose together are conditions on it.
     for _ in range(STEPS):
         places = shape @ turn.T + shift
         rotation = pose[0] @ turn.T

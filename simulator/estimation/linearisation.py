@@ -101,6 +101,8 @@ class Linearisation:
         """
         result = np.sqrt(((rows @ self.shared) ** 2).sum(axis=1))
         rows = rows if drawn is None else drawn
+        # Rounding leaves a change along null directions even of determined functions. It is judged
+        # by the largest change that the function has for a step of a micrometre in any direction.
         size = np.sqrt(((rows * self.as_drawn.spectrum.scale) ** 2).sum(axis=1))
         return blank(result, rows @ self.shared_null, size)
 
@@ -118,6 +120,8 @@ class Linearisation:
     def covariance(self, functions: LinearFunctions, other_functions: LinearFunctions) -> Array:
         """Return covariances (m, k) of functions with others, without undetermined directions."""
         first, second = self._root(functions), self._root(other_functions)
+        # Functions without balls have only the first columns, of the shared parameters. The others
+        # are normal variables of their own, uncorrelated with these.
         width = min(first.shape[1], second.shape[1])
         return np.asarray(first[:, :width] @ second[:, :width].T)
 
@@ -168,6 +172,8 @@ def holding(at: Linearisation, held: Integers) -> Linearisation:
     """
     factor = _holding(at.factor, held)
     found = spectrum(factor)
+    # A held parameter has an uncertainty of zero in every root: those formed of the triangle are
+    # multiplied by this scale, and `known` directions are cleared.
     free = np.ones(len(at.layout))
     free[held] = 0.0
     known = None if found.known is None else free[:, None] * found.known
@@ -178,6 +184,10 @@ def holding(at: Linearisation, held: Integers) -> Linearisation:
 
 def _holding(factor: Factor, held: Integers) -> Factor:
     scale, count = factor.layout.scale, len(held)
+    # The orthogonal transformations that eliminated the balls did not depend on the shared columns.
+    # So a column may be deleted afterwards: the rest of the root is that of the design without the
+    # parameter, and needs to be made triangular again. Columns of zeros keep the places of the
+    # others, and a row of its own keeps each from counting as undetermined.
     rows = in_order(factor) * scale
     rows[:, held] = 0.0
     # As heavy as the heaviest row: neither undetermined nor the measure of what is.
