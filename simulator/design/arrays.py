@@ -103,6 +103,8 @@ class Design:
     def _made(self) -> dict[Callable[[Design], Any], Any]:
         return {}
 
+    # What is made is kept in the instance and is no field: `replace` makes a design without it,
+    # so that nothing made for one design is used for a changed one.
     def once(self, make: Callable[[Design], Made]) -> Made:
         """Return the result of `make` for the design, computed once."""
         if make not in self._made:
@@ -234,6 +236,7 @@ class Observations(ABC):
     @classmethod
     def joined(cls, parts: Sequence[Observations]) -> Self:
         """The observations of all parts, of this kind, together."""
+        # Fields are joined in the order of their declaration, in which the class takes them.
         columns = zip(*(vars(part).values() for part in parts), strict=True)
         return cls(*(np.concatenate(column) for column in columns))
 

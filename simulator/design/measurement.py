@@ -122,6 +122,7 @@ def influence_shifts(
             )
             raise UnusableError(text) from error
         shift += shifts
+        # Constants act on the readings but have no column: they are no parameters.
         varies = np.array(
             [parameter.uncertainty != 0.0 for parameter in influence.parameters], bool
         )

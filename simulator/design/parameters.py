@@ -51,6 +51,8 @@ def shared_layout(design: Design) -> SharedLayout:
     parameters: list[Parameter] = []
     for k in design.posed_positions:
         own_places = design.balls.places[design.balls.artefact == design.positions.artefact[k]]
+        # A turn moves the artefact's balls by up to its extent. A single ball has none, and a
+        # millimetre keeps the scale of its turn finite.
         arm = max(float(np.ptp(own_places, axis=0).max(initial=0.0)), 1e-3)
         for j in np.flatnonzero(~design.positions.held[k]):
             columns[k, j] = len(parameters)

@@ -103,7 +103,7 @@ def without_balls(
     """
     b, m, d = by_ball.shape
     # The same as `triangle` does, for all balls of a batch at once: LAPACK would be called once per
-    # ball. Each ball has pivots of its own, since the heaviest rows of each may be along another axis.
+    # ball. Each ball has pivots of its own, since its heaviest rows may be along another axis.
     heaviest = np.argsort(-weights, axis=1, kind="stable")[:, :, None]
     by_ball, by_rest = (
         np.take_along_axis(by_ball, heaviest, 1),

@@ -29,6 +29,8 @@ def slopes_apart(design: Design, kind: Observations, slope: Array) -> Array:
     are those of the plate's flatness.
     """
     result = slope.copy()
+    # Slopes by all balls that add up to zero belong to functions that shifts of the artefact do not
+    # change, such as distances and heights.
     is_relative = np.abs(slope.sum(axis=1)).max(axis=1) < 1e-9 * np.abs(slope).max(axis=(1, 2))
     artefact = design.balls.artefact[kind.balls[:, 0]]
     for one in np.unique(artefact[is_relative]):

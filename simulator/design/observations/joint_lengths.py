@@ -175,6 +175,9 @@ def length_whitening_of(
         lengths.to_pivot[:, None], 0.0, noise[lengths.second] ** 2
     )
     scatter = np.sqrt((lengths.direction**2 * variance).sum(axis=1)) * lengths.with_repeatability
+    # Lengths without common readings are independent but for their certificates, and need no joint
+    # matrices. If one length of a standard shares a reading, all of the standard are taken
+    # together, since the certificates connect them.
     is_joint = lengths.with_repeatability & _shares_readings(lengths, standard)
     alone = np.flatnonzero(~is_joint)
     _, group = np.unique(lengths.certificate[alone], return_inverse=True)
@@ -201,6 +204,10 @@ def joint_whitening(
     """Whitening of the lengths `chosen` (m,), all of one standard."""
     numbers, inverse = np.unique(lengths.certificate[chosen], return_inverse=True)
     certificate, count = inverse.ravel(), len(numbers)
+    # First the rows of each position and probe by themselves. With an orthonormal basis W of the
+    # range of B and the triangle T of W' B N B' W = T' T, the rows T^-T W' v have unit noise.
+    # Displacements of balls change lengths within this range only, so that nothing about them is
+    # left outside. No matrix of the size of all lengths is factored.
     groups: list[tuple[Integers, Array, Array]] = []
     alike: dict[bytes, list[int]] = {}
     size = 0.0
@@ -215,6 +222,9 @@ def joint_whitening(
         root = np.asarray(np.linalg.solve(triangle.T, within.T).T, float)
         alike.setdefault(certificate[certificate_rows].tobytes(), []).append(len(groups))
         groups.append((rows, within, root))
+    # Positions that read the same lengths tell the same about certificates: the part of v outside
+    # the range contains neither noise nor displacements, only errors of certificates. Their mean is
+    # taken, so that the knowledge counts once.
     together = []
     consistencies, equations_found, errors = [], [np.zeros((0, count))], []
     for members in alike.values():
@@ -229,9 +239,16 @@ def joint_whitening(
         for k in members:
             rows, _, root = groups[k]
             by_error = -root.T * uncertainty
+            # The derivative of the rows by the errors of certificates. What the lengths themselves
+            # determine of these, outside the range, is taken out of the copy that `by_position`
+            # uses; for all positions together it is taken out below.
             errors.append(np.zeros((root.shape[1], count)))
             errors[-1][:, certificate_rows] = by_error
             together.append((rows, root, by_error - (by_error @ outside.T) @ outside))
+    # Errors of certificates split in two. The combinations Q' e of the equations are known, and
+    # their effect is removed from the rows. The others have unit variance and are common to the
+    # rows of all positions, which correlates these by F F'. The symmetric root of (1 + F F')^-1,
+    # from the singular values of F, makes them independent.
     known_directions, directions = _independent(
         np.concatenate(equations_found), len(consistencies) == 1
     )
@@ -251,6 +268,8 @@ def equation_root(lengths: LengthArrays, rows: Integers) -> Array:
     Noise is the same in all readings. An equation without a shared reading would keep the weight 1
     if its length were the root mean square of all.
     """
+    # The square of a length changes by twice the length times the change of the length, so that
+    # noise in squares grows with the length.
     size = lengths.value[rows] / np.sqrt(2.0 * (lengths.value[rows] ** 2).mean())
     readings = int(max(lengths.first.max(), lengths.second.max())) + 1
     within, triangle = _range_and_noise(lengths, np.ones((readings, 1)), rows, size)
@@ -313,6 +332,7 @@ def _independent(equations: Array, told_once: bool) -> tuple[Array, Array]:
         return np.zeros((0, 0)), np.zeros((equations.shape[1], 0))
     if told_once:
         return np.eye(len(equations)), equations.T
+    # Different sets of lengths may imply the same combination of certificates. It counts once.
     left_vectors, values, right = svd(equations, full_matrices=False)
     is_independent = values > TOLD_TWICE * values[0]
     return left_vectors[:, is_independent].T / values[is_independent, None], (

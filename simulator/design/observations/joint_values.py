@@ -75,6 +75,8 @@ class JointValues(BallObservations):
         balls_by_part = self._balls
         result = np.zeros((len(self), max(map(len, balls_by_part), default=0)), np.int64)
         for part, balls_of_part in zip(self._parts, balls_by_part, strict=True):
+            # Blocks have different numbers of balls. The columns of padding keep zero slopes, so
+            # that the ball named there is not affected.
             result[part] = balls_of_part[0]
             result[part, : len(balls_of_part)] = balls_of_part
         return result
@@ -94,6 +96,7 @@ class JointValues(BallObservations):
                 np.arange(part.start, part.stop),
             )
             for column in range(place.shape[1]):
+                # Added, not assigned: a row may name one ball in two columns.
                 slope[..., row, place[:, column], :] += by_ball[..., column, :]
         return value, slope
 
@@ -122,6 +125,8 @@ class JointValues(BallObservations):
         """The same values, uncorrelated, with weights of about one each: a value whose slope is not
         about one has the weight that its slope makes.
         """
+        # Without correlations: whitening by any regular matrix changes neither rank nor null space,
+        # and that of nearly singular blocks would bring back the weights that are to be avoided.
         slope = self.values(design.balls.places)[1]
         sizes = np.abs(slope).max(axis=(1, 2), initial=0.0)
         divisors = np.where(sizes > 0.0, sizes, 1.0)

@@ -71,6 +71,8 @@ class Lengths(LengthArrays, Observations):
         )
 
     def alike(self, design: Design, state: State) -> Lengths:
+        # Each length for itself, with a certificate of its own: correlations by shared readings or
+        # certificates change weights, not rank.
         return replace(
             self,
             uncertainty=np.ones(len(self)),
@@ -130,6 +132,8 @@ def _length_derivative(
     lengths = design.of(Lengths)
     # What is held goes to the extra column.
     rows = np.zeros((len(lengths), len(layout) + 1))
+    # A length changes with the corrected points at its ends, along its direction: a turn of the
+    # direction is of second order.
     for end in measured.ends:
         along = measured.unit[end.rows]
         by_model = design.model.jacobian(end.points, state.a, end.offsets)
@@ -198,10 +202,13 @@ def _measured(design: Design, state: State, x: Array | None) -> _Measured:
                 reach = length_values(design, state)[pivoted, None] * lengths.direction[pivoted]
                 points[pivoted] = pivot + reach - p[pivoted]
         difference[rows] += sign * (
+            # In planning the machine has no errors, and the offset is all of the correction.
             points + (p if x is None else design.model.error(points, state.a, p))
         )
         ends.append(_End(sign, rows, points, p, readings.probe))
     difference[pivoted] -= pivot
+    # Directions at the state, as derivatives need them. Weights use nominal ones, and stay constant
+    # during an iteration.
     unit = difference / np.sqrt((difference**2).sum(axis=1))[:, None]
     unit = np.where(lengths.projected[:, None], lengths.direction, unit)
     length = np.einsum("md,md->m", unit, difference)

@@ -75,6 +75,7 @@ class Priors(Observations):
         """
         if model == design.model:
             return self._values(design, truth)
+        # Parameters of one model have no values on another. Their priors are then taken as right.
         elsewhere = replace(truth, a=np.zeros(self.by_model.shape[1]))
         return np.where(self.of_model, self.value, self._values(design, elsewhere))
 
@@ -106,6 +107,8 @@ class Priors(Observations):
 
     def _values(self, design: Design, state: State) -> Array:
         """Return values (m,) at `state` of the functions that the priors concern."""
+        # Every row looks up a value of each kind. Where its index is -1 the value is an arbitrary
+        # one, and the selections below drop it.
         of_poses = _pose_values(design, state)[self.position, self.component]
         axis = np.minimum(self.component, design.dimension - 1)
         of_probes = state.probes[self.probe, axis]
@@ -143,6 +146,8 @@ class Priors(Observations):
         derivative[rows, layout.pose_columns[self.position[rows], self.component[rows]]] = 1.0
         rows = np.flatnonzero((self.position >= 0) & (self.component >= d))
         place = self.position[rows]
+        # The prior is on the rotation vector from the nominal pose, a parameter is a small turn
+        # about the machine's axes at the state. For large deviations the two differ.
         rate = vector_rate(_pose_values(design, state)[place, d:])[
             np.arange(len(rows)), self.component[rows] - d
         ]

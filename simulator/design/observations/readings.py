@@ -115,6 +115,9 @@ def reading_blocks(
     by_model *= weight[:, :, None]
     by_pose = np.zeros((len(x), d, pose_size(d)), np.result_type(arm, float))
     by_pose[:, range(d), range(d)] = -weight
+    # A small turn is about the machine's axes, applied after the rotation of the state: its
+    # derivative is the cross product with the arm, at any rotation, and no angles of a sequence
+    # occur that could become singular.
     by_pose[:, :, d:] = -weight[:, :, None] * rotation_sensitivity(arm)
     if design.positions.across is not None:
         # Tilts are held: they would show through holes that are out of the plane alone.

@@ -72,6 +72,9 @@ class Star:
         if not self.has_place:
             source = source - source.mean(axis=0)
             offsets = offsets - offsets.mean(axis=-2, keepdims=True)
+        # The least sum of squares of p - R c over rotations: R = U V' of the singular value
+        # decomposition of the sum of p c', with the sign of the last vector chosen so that R is no
+        # reflection.
         together = offsets.swapaxes(-1, -2) @ source
         if _in_line(self):
             together = together + LEAST_TURN * (source**2).sum() * np.eye(source.shape[1])
@@ -91,6 +94,7 @@ def _moves(star: Star) -> Array:
     if star.has_place:
         return turns
     size = max(float(np.sqrt((arms**2).sum())), np.finfo(float).tiny)
+    # Shifts as long as the turns' columns, so that one threshold of singular values serves both.
     return np.concatenate([turns, np.tile(size * np.eye(d), (count, 1)) / np.sqrt(count)], axis=1)
 
 
@@ -111,6 +115,10 @@ def _shape(star: Star) -> tuple[Array, Integers]:
     tip, and which (m,).
     """
     free = _free(star)
+    # Any orthonormal basis across the motions of the body gives the same sum of squares. This one
+    # can be named: co-ordinates of tips are chosen one after the other, each with the largest part
+    # that those before leave, and the basis nearest to their projections is U V' of these. Each row
+    # is then mostly one co-ordinate, which messages name.
     across = np.eye(len(free)) - free @ free.T
     remainder, chosen = across.copy(), []
     for _ in range(len(free) - free.shape[1]):
@@ -148,6 +156,8 @@ class Stars(Observations):
         by_shared = np.zeros((len(self), len(design.once(shared_layout)) + 1))
         row = 0
         for star, probes, basis in zip(self.stars, self.probes, self.bases, strict=True):
+            # The derivative holds the nearest rotation, as in variable projection: a change of it
+            # moves R' p nearly along the motions of the body, and the rows are across these.
             turn = star.rotation(state.probes[probes])
             slopes = np.einsum("ldm,ed->mle", basis.reshape(*star.coordinates.shape, -1), turn)
             # What is held goes to the extra column.
@@ -238,11 +248,15 @@ def _turned(star: Star, probes: Integers, design: Design, x: Array) -> Array:
     np.add.at(counts, (place, tip), 1.0)
     np.add.at(total, (place, tip), x[rows])
     times = counts.sum(axis=1)
+    # Normal equations of x = place - offset with the unknown places eliminated: every place takes
+    # the mean of its readings out of them. A common shift of all offsets stays open, and the rank
+    # is one less than the number of tips if readings connect all of them.
     weights = np.diag(counts.sum(axis=0)) - counts.T @ (counts / times[:, None])
     sides = -(total.sum(axis=0) - counts.T @ (total.sum(axis=1) / times[:, None]))
     offsets, _, rank, _ = lstsq(weights, sides, rcond=1e-9)
     if rank < len(probes) - 1:
         return drawn
+    # Differences of offsets alone are known here, hence the rotation about their mean.
     alone = replace(star, has_place=False)
     turn = alone.rotation(offsets)
     if star.has_place:

@@ -38,6 +38,7 @@ class Whitening:
         return self._projected(rows) / _along(self.own, rows)
 
     def _projected(self, rows: Array) -> Array:
+        # The usual case, without shared errors.
         if not self.direction.any():
             return rows
         direction = _along(self.direction, rows)
@@ -64,6 +65,8 @@ def whitening(own_uncertainty: Array, shared: Array, group: Integers) -> Whiteni
     array([[25., 16.],
            [16., 25.]])
     """
+    # Without an error of its own a row would have no finite ratio. Such are lengths whose
+    # repeatability is ignored: the stated uncertainty is the whole of theirs, each time again.
     alone = (np.bincount(group, minlength=1)[group] == 1) | (own_uncertainty == 0.0)
     total = np.where(alone, np.hypot(own_uncertainty, shared), own_uncertainty)
     ratio = np.where(alone, 0.0, shared / np.where(alone, 1.0, own_uncertainty))
@@ -151,11 +154,15 @@ def covariance_root(covariance: Array, rounding: Array | float = 0.0) -> Covaria
            [16., 25.]])
     """
     size = np.sqrt(np.diag(covariance))
+    # A value without uncertainty has no correlations. Divided by what it counts as, its row would
+    # have some that are made of rounding.
     exact = size <= EXACT
     variances = np.where(exact, EXACT, size)
     inner, doubt = ~exact, ""
     vectors, deviations = np.eye(len(variances)), np.ones(len(variances))
     if inner.any():
+        # Eigenvalues of correlations are between 0 and m whatever the units and sizes of values.
+        # One threshold then serves all of them.
         scale = np.outer(variances[inner], variances[inner])
         correlation = covariance[np.ix_(inner, inner)] / scale
         values, eigenvectors = eigh((correlation + correlation.T) / 2.0)
@@ -163,6 +170,8 @@ def covariance_root(covariance: Array, rounding: Array | float = 0.0) -> Covaria
         least, size_of_rounding = float(values[0]), float(np.sqrt((share**2).sum()))
         if least < -size_of_rounding - SINGULAR * len(values):
             raise IndefiniteError(float(values[0] / values[-1]))
+        # An eigenvalue that rounding made zero stands for an unknown small one. Left at `SINGULAR`,
+        # it would make of a combination of values an almost exact one.
         raised = least <= SINGULAR
         floor = max(SINGULAR, -least, float(share.max())) if raised else SINGULAR
         # The expected norm of a symmetric matrix of such independent errors (Wigner).
