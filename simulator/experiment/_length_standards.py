@@ -64,6 +64,8 @@ def standard_lengths(
     ]
     for i in np.flatnonzero(np.isin(position_artefact[readings.position], standards)).tolist():
         index_of_pair[int(readings.position[i]), int(readings.probe[i]), int(readings.ball[i])] = i
+    # Certificates are told apart by keys: the item and its pair, or, without repeatability, a
+    # number that no other length has.
     anew = count()
 
     def between(number: int, kinds: list[tuple[_Row, Array]]) -> Iterator[_Row]:
@@ -98,6 +100,8 @@ def standard_lengths(
         ):
             is_projected, scatters = item.form == "projection", item.repeatability == "included"
             uncertainty = item.standard_uncertainties
+            # A length that scatters has at least the noise of its readings. One that does not has
+            # no other weight than its stated uncertainty, which may be zero.
             if not scatters:
                 uncertainty = at_least_exact(uncertainty)
             given = zip(item.pairs, item.values.tolist(), uncertainty.tolist(), strict=True)

@@ -75,6 +75,8 @@ def resolve(
     probes = resolve_probes(sections, references)
     bounds = resolve_bounds(sections, machine, probes, references)
     sections = with_machines(sections, machine, references)
+    # An entry that is invalid otherwise may have wrong names too, which would be reported only
+    # after its repair.
     for steps in sections.invalid:
         if steps[0] in ("positions", "calibration"):
             references.check_written(steps)

@@ -63,6 +63,8 @@ def variant_trees(root: Node, problems: Problems) -> dict[str, Node]:
         places: dict[str, tuple[str, ...]] = {}
         for path, node in overrides.items.items():
             try:
+                # Paths name entries of the file as it stands. Two paths of which one contains the
+                # other would depend on their order.
                 place = place_of(base, path)
                 overlapping = next(
                     (p for p, steps in places.items() if _overlap(steps, place)), None
@@ -170,6 +172,8 @@ def _replaced(
         below = _replaced(node.items[step], deeper, value, mark, here) if deeper else value
         if below is None:
             return replace(node, items={key: node.items[key] for key in node.items if key != step})
+        # Nodes beside the path are those of the first tree. Whether a part has changed is then a
+        # comparison by identity, and messages about it have one location for all variants.
         marks = node.key_marks if deeper else {**node.key_marks, step: mark}
         return replace(node, items={**node.items, step: below}, key_marks=marks)
     if isinstance(node, Sequence):
@@ -182,6 +186,7 @@ def _replaced(
 
 
 def _index(node: Sequence, step: str, above: tuple[str, ...]) -> int:
+    # No more digits, since conversion of thousands of them takes long or is refused.
     if re.fullmatch(r"[0-9]{1,9}", step):
         if int(step) < len(node.items):
             return int(step)

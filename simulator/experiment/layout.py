@@ -78,6 +78,8 @@ def lay_out(experiment: Experiment, is_pool: bool = False) -> Design:
     first_ball = dict(zip(artefacts, np.cumsum([0, *sizes[:-1]]), strict=True))
     balls = np.concatenate([layout.coordinates[:, :d] for layout in layouts])
     for item in experiment.calibration:
+        # The ball of a gauge moves on a sphere about the pivot. A certified radius takes the place
+        # of the nominal one.
         if isinstance(item, RadiusCalibration):
             first = first_ball[item.artefact]
             balls_of_artefact = slice(first, first + len(experiment.layouts[item.artefact].names))
@@ -95,6 +97,7 @@ def lay_out(experiment: Experiment, is_pool: bool = False) -> Design:
     rotations = np.array([place.pose.rotation for place in places])
     origins = np.array([place.pose.origin for place in places])
     observations = _stated(experiment, first_ball)
+    # These two kinds are always there, empty if nothing is stated, and have a fixed place.
     distances, coordinates, *other_observations = observations
     lengths, unknown = standard_lengths(
         experiment, readings, first_ball, rotations, position_artefact, balls
@@ -212,6 +215,8 @@ def _across(
     in_plane = [artefact.reads == "in plane" for artefact in experiment.artefacts.values()]
     if not any(in_plane):
         return None
+    # The normal of the plane in the machine. It is along an axis: oblique artefacts that are read
+    # in their plane are refused when positions are resolved.
     axis = np.abs(rotations[:, :, -1]).argmax(axis=1)
     return np.where(np.array(in_plane)[position_artefact], axis, -1)
 
@@ -291,6 +296,11 @@ def _stated(experiment: Experiment, first_ball: dict[str, int]) -> list[Observat
     return [*joined, JointValues.of(joint)] if joint else joined
 
 
+# Readings do not distinguish a motion of the artefact's frame from the opposite motion of all its
+# poses, and would leave six null directions that say nothing about the machine. What certified
+# co-ordinates do not fix of the frame is therefore fixed by the first pose. Turns that leave all
+# balls where they are, of balls in a line or of a single ball, are open in every pose, and each is
+# held by itself.
 def _held(
     balls: Balls,
     position_artefact: Integers,
@@ -318,6 +328,7 @@ def _held(
         for k in positions:
             held_flags[k] |= _pivots(_in_machine_axes(idle, rotations[k]))
         chosen = np.isin(ball, members)
+        # About the centre of the balls, as the idle turns are.
         fixed = _motion_of_coordinates(
             balls.places[ball[chosen]] - places.mean(axis=0), axis[chosen], d
         )
@@ -325,6 +336,8 @@ def _held(
         free = _null_space(np.concatenate([fixed, idle.T]))
         first = rotations[positions[0]]
         motions = _in_machine_axes(np.concatenate([idle, free], axis=1), first)
+        # What is held of idle turns counts among the pivots, so that in all no parameter too many
+        # is held.
         held_flags[positions[0]] |= _pivots(motions, held_flags[positions[0]])
     return held_flags
 
@@ -380,6 +393,9 @@ def _null_space(rows: Array) -> Array:
     return directions[rank:].T
 
 
+# Pivoted elimination of rows: to hold a parameter removes the motions that would change it. The
+# parameter that they change most is taken first, and the remaining motions are made orthogonal to
+# it, so that those held determine all motions, and well.
 def _pivots(motions: Array, already: Flags | None = None) -> Flags:
     """Parameters (rows of `motions`) to hold so that no motion remains, those `already` held first,
     then largest.

@@ -77,6 +77,7 @@ def resolve_positions(
         ]
         shifts = [[parts.get(axis, 0.0) for axis in AXIS_INDEX][:d] for parts in lengths]
         poses = shifted(poses, shifts)
+        # From the place taken, as far as the artefact can still be moved either way.
         rooms = [room - shift for room, shift in zip(rooms, shifts, strict=True)]
     return {
         draft.steps: Position(

@@ -40,6 +40,7 @@ class References:
     layouts: dict[str, BallLayout]
     trust: Trust = UNKNOWN
     volume: Volume | None = None
+    # Counts, like the problems, are shared by all copies with another volume.
     tally: Counter[str] = field(default_factory=Counter)
 
     def file(self, name: object) -> Path:

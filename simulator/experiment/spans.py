@@ -35,6 +35,9 @@ def unspanned(tree: Node, changed: Experiment) -> str:
         return ""
     volume, plates = changed.machine.volume, _plates(changed)
     places = {place.name: place for place in before.positions}
+    # Rooms are what is left between the outermost plates of each side and the ends that a plate can
+    # reach. The second has them as if all places had grown with the free room, as stated parts of
+    # it do. A variant with a smaller plate or a larger volume has lost the difference.
     room = _least(changed, [np.abs(place.room) for place in plates])
     followed = _least(changed, [_followed(place, places.get(place.name)) for place in plates])
     is_lost = room > followed + SLIGHTLY * volume.size

@@ -204,6 +204,8 @@ def uncertainties_of(
         matrix = common, np.zeros_like(common)
     assert matrix is not None
     size = np.sqrt(np.diag(matrix[0]))
+    # A certificate may give expanded uncertainties beside a covariance. Where both are stated they
+    # must agree, or the factor would pass unseen.
     has_both = covariance is not None and not len(without)
     if has_both and (text := _disagreement(names, is_pair, size, uncertainties_read)):
         problems.add(place, text)

@@ -151,6 +151,8 @@ def validate_sections(root: Node, problems: Problems, planning: bool = False) ->
     problems.add_empty()
     parts = [*_parts_of_extensions(root, problems), *_parts_of_kernel(root, problems, planning)]
     values = validated_parts(parts, problems)
+    # Only keys that are not written get their defaults. A section that is written and invalid stays
+    # None, so that nothing is computed with a default in its place.
     sections: dict[str, Any] = {
         key: section.get_default(call_default_factory=True)  # type: ignore[call-arg,unused-ignore]
         for key, section in ExperimentSettings.model_fields.items()
@@ -165,6 +167,7 @@ def validate_sections(root: Node, problems: Problems, planning: bool = False) ->
             sections[key] = value
         elif key != "pool":
             sections["own"][key] = value
+    # A path of two steps is an entry of a section that is validated entry by entry.
     invalid = tuple(steps for steps, _, _ in parts if len(steps) == 2 and steps not in values)
     return Sections(**sections, pool=_pool(root, values), invalid=invalid)
 
@@ -308,4 +311,6 @@ def _form(key: str) -> Any:
     if key in ENTRIES:
         return ENTRIES[key][1]
     field = ExperimentSettings.model_fields[key]
+    # A type together with the constraints of its field: by itself a section is validated as it
+    # would be within the whole.
     return Annotated[field.annotation, field]

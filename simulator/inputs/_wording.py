@@ -81,6 +81,11 @@ def explain(errors: list[ErrorDetails], node: Node, schema: Schema) -> list[Expl
     return list(dict.fromkeys(explanations))
 
 
+# Where a value may have several forms, pydantic tries all of them and reports why each has failed.
+# An author wrote one form, and only its faults are of use. Forms that do not fit the kind of value
+# at all, a list for a number, are left out, unless none fits. Of the rest the one that went
+# furthest into the value before it failed is the likeliest. If several went equally far, the first
+# fault of each is stated, joined by "or".
 def _nearest_choice(choices: list[list[tuple[Explanation, bool]]]) -> list[Explanation]:
     # The choice that failed deepest in the tree is the one that the author meant.
     same_form = [
@@ -102,6 +107,11 @@ def _location(error: ErrorDetails, root: Node) -> tuple[Steps, Node, tuple[Steps
     """Return the path of an error, its node, or the one above if the last step does not exist, and
     the path at which one of several forms was tried, with that form.
     """
+    # Pydantic's path mixes keys and indices of the file with names of what was tried: the kind of a
+    # discriminated union, the form of another union, `[key]` for a fault of a key itself. Steps
+    # that the file has are followed. A step equal to the kind of the mapping is its tag, but only
+    # once, since a key may have that name too. The first remaining step names the form that was
+    # tried.
     steps: Steps = ()
     node, choice, tagged = root, None, False
     for i, step in enumerate(error["loc"]):

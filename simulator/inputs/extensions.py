@@ -283,6 +283,7 @@ def fault_of(error: Exception) -> str | None:
     """Return file, line and name of the extension, not shipped, whose code raised an error, or
     None.
     """
+    # The innermost frame of such an extension is named: it is nearest to the cause.
     packages = {extension.package: extension.name for extension in registered()[0]}
     fault, trace = None, error.__traceback__
     while trace is not None:
@@ -335,6 +336,8 @@ def function(name: str) -> Any:
     :raises MissingExtensionError: its extension is not installed.
     """
     value = getattr(module_with("functions", name), name)
+    # A function of an installed extension may need a missing one when it is called. If none is
+    # missing, the function itself is returned.
     are_all_there = all(extension.is_installed for extension in shipped())
     return value if are_all_there or not isinstance(value, FunctionType) else _naming(value)
 

@@ -27,6 +27,7 @@ LARGEST, SMALLEST = 10**6, Fraction(1, 10**18)
 SMALLEST_FLOAT = float(SMALLEST)
 LENGTH_FUNCTION_EXAMPLE = "0.5 um + L/1000000"
 NUMBER = r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]{1,6})?"
+# A unit begins with a character that no number has, or with 1/ after a space.
 QUANTITY = re.compile(rf"({NUMBER})\s*((?:(?<=\s)1/|[^\s0-9.+-]).*)?")
 # A constant, and what is added for each metre: a divisor of L, or a ratio.
 GROWING = re.compile(rf"(.+?)\+\s*(?:L\s*/\s*({NUMBER})|({NUMBER}\s*[^\s0-9.+-][^+]*))\s*")
@@ -51,6 +52,7 @@ def exact_number(text: str) -> Fraction:
     if len(text) > 200 or re.fullmatch(NUMBER, text) is None:
         raise QuantityError(f'"{shorten(text)}" is not a number; write for example "500.0003"')
     decimal = Decimal(text)
+    # Before it becomes a fraction, which has as many digits as the exponent says.
     if decimal and not -300 <= decimal.adjusted() <= 300:
         raise QuantityError(
             f'"{text}" is beyond what can be computed with; write a number of usual size'

@@ -75,6 +75,12 @@ def _schema(adapter: TypeAdapter[Any]) -> dict[str, Any]:
     return adapter.json_schema()
 
 
+# A pydantic union is closed when its class is made, and the kernel imports no extension. So kinds
+# are looked up during validation, when a file names one. Pydantic asks an annotation for two
+# things: the first hook wraps the validator of the kernel's union, which stays in charge of the
+# kinds that it has, the second extends its JSON schema, for `ballplate schema` and for messages.
+# Faults within an extension's settings are reported as those of the kernel's are, since its own
+# class validates them.
 @dataclass(frozen=True)
 class OpenKinds:
     """Annotation of a union, or of `base` where the kernel has no kinds: values of `kind` that it
@@ -124,6 +130,8 @@ class OpenKinds:
         try:
             return of_kernel(value)
         except ValidationError as refusal:
+            # Only an unknown kind of this very value: with a location, it is one of a union further
+            # down, in a kind that the kernel has.
             (first, *_) = refusal.errors(include_url=False, include_input=False)
             if first["type"] != "union_tag_invalid" or first["loc"]:
                 raise
@@ -138,9 +146,11 @@ class OpenKinds:
         union_schema = handler(schema)
         additions: list[Any] = []
         for kind in names(self.provided, with_registered=True):
+            # Kinds of a shipped extension that is not installed are left out of the schema.
             with suppress(MissingExtensionError):
                 additions.append(self.settings(kind))
         for settings in additions:
+            # Pydantic may have deferred a class's schema.
             settings.model_rebuild()
         if additions:
             # As members of a union their own models are added to the definitions.

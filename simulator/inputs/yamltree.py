@@ -21,6 +21,7 @@ from .decoding import refuse_binary, refuse_long_lines
 from .messages import MORE_ERRORS, MOST_MESSAGES, ExperimentError, Message, Step, Steps, refused
 from .settings import listing, shorten
 
+# Far beyond any experiment. Functions that walk a tree call themselves at each level.
 DEEPEST = 50
 MOST_NODES = 500_000
 # Room for a table of a million rows.

@@ -222,6 +222,9 @@ def empirical_model(
         for name, corner in frame:
             if name == function:
                 at_corner = own_terms.values(np.array([corner]))[0, columns_left]
+                # A function that has to be zero at a corner loses the term that is not. Two such
+                # terms could cancel each other there, and the condition would be no choice of terms
+                # any more.
                 touched = np.flatnonzero(np.abs(at_corner) > 1e-9)
                 if len(touched) > 1:
                     raise ValueError(f"{len(touched)} terms of {function} are not zero at {corner}")

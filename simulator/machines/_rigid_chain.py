@@ -51,6 +51,9 @@ def rigid_chain(
     def turned(matrix: Array, vector: Array) -> Array:
         return np.einsum("mij,mj->mi", matrix, vector)
 
+    # From the tip to the base of the probe's side: every axis turns what it carries, then adds its
+    # own displacement and error. A derivative by the angles of an axis is found in that axis's
+    # frame. The rotations of all axes nearer to the base then turn it into the frame of the base.
     tip = p.astype(dtype, copy=True)
     on_probe_side = [AXES.index(name) for name in arrangement.probe_side]
     for axis in reversed(on_probe_side):
@@ -73,6 +76,7 @@ def rigid_chain(
         outside = tip + step(axis)
         by_translation[axis] = np.broadcast_to(np.eye(3, dtype=dtype), (m, 3, 3))
         by_rotation[axis] = np.zeros((m, 3, 3), dtype)
+        # All derivatives so far are of vectors that this axis turns back.
         for earlier in [*passed, axis]:
             by_translation[earlier] = back @ by_translation[earlier]
             by_rotation[earlier] = back @ by_rotation[earlier]

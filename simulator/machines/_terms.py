@@ -119,6 +119,9 @@ def sums(*bases: Basis) -> Products:
     ('s1(x)', 's1(x)*y', 's1(x)*z')
     """
     axes, indices = _axes(bases)
+    # Products of each axis's functions with linear factors have some of these terms in common: xy
+    # is among those of x and of y. That is the redundancy of NPL Report CISE 15/98, equation (4).
+    # Here they are listed once, and each axis adds its interior functions alone.
     factors = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (1, 0, 1), (0, 1, 1)]
     for axis in range(3):
         across = [k for k in range(3) if k != axis]
@@ -229,6 +232,10 @@ class Radial:
         """Coefficients of the radial functions (n, n) and of 1, x, y, z (4, n) per value at a
         centre.
         """
+        # Values at the centres are K r + L c, with L' r = 0. With an orthonormal basis N of what is
+        # orthogonal to the linear polynomials L, r = N s: N' K N s is N' times the values, and c
+        # follows from the rest. K itself may be singular or indefinite, N' K N is definite up to
+        # sign.
         kernel, linear = self._functions(self.centres)
         q, r = np.linalg.qr(linear, mode="complete")
         null = q[:, 4:]

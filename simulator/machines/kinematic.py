@@ -108,6 +108,9 @@ class KinematicModel:
         span = np.subtract(self.upper, self.lower)
         parameters = []
         for function in self.functions:
+            # The effect of a coefficient on points: the peak of its function, and for a rotation
+            # the longest arm in the volume. It scales parameters when rank and steps are judged,
+            # and needs no accuracy.
             grid = np.linspace(0.0, 1.0, 65)
             peaks = np.abs(function.basis.values(grid)).max(axis=0, initial=0.0)
             arm = float(span.max()) if function.rotation else 1.0
@@ -164,6 +167,8 @@ class KinematicModel:
                 rigid_chain(self.arrangement, from_origin, translation, rotation, p)[0]
                 - from_origin
             )
+        # NPL Report CISE 15/98, equation (10): products of errors are neglected, so that the
+        # rotations of axes add up, each crosswise with what its axis carries.
         carried = carried_vectors(self.arrangement, from_origin, p)
         moved = translation.sum(axis=1) + p
         for axis, (sign, vector) in enumerate(carried):

@@ -125,6 +125,9 @@ class SpatialMetricModel:
         scale = 1.0 + a[:3] if self.with_scales else np.ones(3)
         c, b, a_ = a[-3:]
         sin_c, cos_c, sin_b, sin_a = np.sin(c), np.cos(c), np.sin(b), np.sin(a_)
+        # Unit vectors with the stated angles between them: X is (1, 0, 0), Y is (-sin C, cos C, 0),
+        # and Z is (sin B, w, v), with w from its product with Y, which is -sin A, and v from its
+        # length.
         w = (sin_c * sin_b - sin_a) / cos_c
         v = np.sqrt(1.0 - sin_b**2 - w**2)
         kind = np.result_type(a, float)

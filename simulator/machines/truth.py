@@ -187,6 +187,8 @@ def _parameters_of_values(values: dict[str, str], model: ErrorModel) -> Array:
     if given_quoted:
         targets_quoted = np.zeros(len(reported.names))
         targets_quoted[list(given_quoted)] = [value for _, value in given_quoted.values()]
+        # A function that is zero at both ends has one quoted coefficient more than parameters.
+        # Values that break this condition leave a residual.
         solution = lstsq(reported.matrix, targets_quoted, rcond=None)[0]
         residual = reported.matrix @ solution - targets_quoted
         for row, (name, value) in given_quoted.items():
