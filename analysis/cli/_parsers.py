@@ -122,6 +122,9 @@ def _join_other_commands(parser: Any) -> None:
 
 def with_command(words: Sequence[str]) -> list[str]:
     """A command line whose first word is the command, with the option that makes it another one."""
+    # Another command with options of its own, such as "run --errors", is a parser of its own.
+    # Argparse knows no such thing: the option is taken out before, and its name joined to the
+    # command.
     command, *arguments = words
     if command.startswith("-"):
         return list(words)
@@ -210,6 +213,8 @@ def _add_other_commands(command: _Parser, name: str) -> None:
 
 def grammar(word: str) -> _Parser:
     """The grammar that a command line needs that begins with a word."""
+    # Most often one command is meant, and only its module is loaded. The listing of all needs no
+    # options. A wrong word is answered with the names of all commands.
     is_command = word in COMMANDS or not word.startswith("-") and provider("commands", word)
     if is_command:
         return parser([word])

@@ -185,6 +185,10 @@ def _run(options: argparse.Namespace) -> int:
     from ballplate.simulator.inputs.messages import ExperimentError, in_one_line
 
     try:
+        # What a user can mend is answered in a line, with the status of a file that cannot be used,
+        # and without a traceback. From the specific to the general: an error that one of these
+        # names is not judged by its class below. What remains is a fault of the program, and is
+        # raised.
         check_outputs(options)
         options.is_written = True
         with told(options):

@@ -216,6 +216,7 @@ def _refuse_inputs(outputs: list[Output], options: Namespace) -> None:
     ]
     if not there:
         return
+    # Compared by the file itself, since links and different spellings of a path lead to one file.
     for path in inputs(options, {output.dest for output in outputs}):
         status = status_of(path)
         for output, status_there in there:
@@ -267,6 +268,8 @@ def _reasons_against(output: Output, force: bool) -> list[Message]:
                 # Without writing anything; tells of permissions, and of other programs that hold it
                 # on Windows.
                 path.open("r+b").close()
+            # Whether the folder takes a file is known only after making one. Output is written to
+            # such a file first and then moved, so that this tests what will be done.
             temporary = beside(real(path))
             with interruptions_blocked(signal.SIGTERM):
                 make(temporary)

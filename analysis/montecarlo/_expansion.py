@@ -126,6 +126,9 @@ def expand(
     d = x.shape[1]
     jacobian = model.jacobian(x, a, p)
     by_place, mixed = [], []
+    # To first order in readings and in parameters, with the products of both: both change at once
+    # in a replicate, by noise and by the estimate. Whether that is enough for a model,
+    # `_is_faithful` tests beforehand.
     for axis in range(2 * d if with_offsets else d):
         # Offsets act linearly, so that a large step is exact to rounding.
         step = STEP if axis < d else OFFSET_STEP
@@ -134,6 +137,7 @@ def expand(
         above, below = (x + shift[0], a, p + shift[1]), (x - shift[0], a, p - shift[1])
         by_place.append((model.error(*above) - model.error(*below)) / (2 * step))
         mixed.append((model.jacobian(*above) - model.jacobian(*below)) / (2 * step))
+    # `change` adds the offset itself, without rounding of differences.
     for axis in range(d, len(by_place)):
         by_place[axis][:, axis - d] -= 1.0
     # Differences for a zero derivative are rounding errors.

@@ -127,6 +127,8 @@ def reference(design: Design, truth: Truth) -> Reference:
     :raises NoReadingError: errors of the true machine so large that no reading belongs to some
         location.
     """
+    # Every repeat is a row: repeats scatter about their mean, and S^2 and its degrees of freedom
+    # have that scatter.
     observed = _observed(design)
     least = EXACT_ENOUGH * float(observed.machine.repeatability.min())
     observed = observed.observed(*(kind.loosened(least) for kind in observed.observations))
@@ -134,6 +136,9 @@ def reference(design: Design, truth: Truth) -> Reference:
     # determined.
     drawn = linearise(observed)
     readings = observed.readings
+    # Readings and certified values as the true machine and the true artefacts give them, without
+    # noise. Where the fitted model cannot follow the true machine, what this estimate is off by is
+    # the bias that all replicates share.
     exact = true_readings(observed, truth.state, readings, truth.model)
     observed = observed.observed(
         *(
@@ -232,6 +237,9 @@ def _groups(design: Design) -> list[Integers]:
     """Return indices into the plates' readings, in groups of one position, each ball once."""
     readings = design.readings.select(design.plate_readings)
     key = readings.position * len(design.balls.names) + readings.ball
+    # The first reading of each ball in a position makes the first group, the second readings the
+    # next. Gradients by balls can then be subtracted by index, without two readings of one ball at
+    # once.
     order = np.argsort(key, kind="stable")
     first = np.searchsorted(key[order], key[order])
     turn = np.empty(len(key), np.int64)
@@ -256,6 +264,8 @@ def _is_faithful(
 ) -> bool:
     """Return whether an expansion of the model agrees with the model."""
     p = start.probes[design.readings.probe]
+    # Two replicates as they will occur: noise of the readings, and parameters that follow the
+    # covariance.
     generator = np.random.default_rng(np.random.SeedSequence(0))
     noise = reading_noise(design, design.readings).T
     moved = noise * generator.standard_normal((2, design.dimension, len(exact)))
@@ -279,6 +289,8 @@ def complete_fit(
     undetermined are held, as in all replicates, and no others.
     """
     design, x = replicate_data(shared, moved, errors, ends)
+    # At full rank the spectrum of the reference has no null directions, so that none can appear by
+    # noise.
     held_spectrum = shared.spectrum if shared.drawn is None else shared.drawn.spectrum
     return iterate(design, x, initial_state(design, x), held_spectrum=held_spectrum)
 

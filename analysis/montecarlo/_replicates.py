@@ -114,6 +114,8 @@ def draw(shared: Reference, seed: int, batch: int) -> Draw:
     generator = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(batch,)))
     design = shared.design
     shape = (BATCH, *shared.noise.shape)
+    # Always a whole batch, also if fewer replicates are wanted: a replicate has the same noise in a
+    # run of any length.
     moved = shared.noise * design.noise.draw(generator, shape, shared.position, 2)
     errors = tuple(kind.errors(generator, BATCH) for kind in design.observations)
     return Draw(moved, errors, _drawn_ends(shared, generator))
@@ -154,12 +156,16 @@ def _refined(shared: Reference, drawn: Draw, index: Integers) -> Estimates:
     is_separate = np.zeros(count, bool)
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         for number in range(PASSES):
+            # The gradient is that of the replicate itself, and exact. Only the matrix of the step
+            # is shared, so that it decides how fast passes converge, not what to.
             before, by_ball, by_shared = _gradient(shared, drawn, at)
             balls, common = _step(shared, by_ball, by_shared)
             # A converged replicate stays unchanged, so that its result does not depend on others.
             active = ~(converged | is_separate)
             balls, common = balls * active[:, None, None], common * active[:, None]
             poses = np.where(columns >= 0, common[:, np.maximum(columns, 0)], 0.0)
+            # Rotation vectors do not add. The second term is the first correction for that (Baker,
+            # Campbell, Hausdorff): a turn t after a turn r has the vector r + t + t x r / 2.
             turn = poses[:, :, d:]
             at = Deviations(
                 at.balls + balls,
@@ -243,6 +249,9 @@ def _gradient(shared: Reference, drawn: Draw, at: Deviations) -> tuple[Array, Ar
     by_ball = np.zeros_like(at.balls)
     by_pose = np.zeros((len(at.a), *layout.pose_columns.shape))
     by_shared = np.zeros((len(at.a), len(layout)))
+    # Readings of one position share its rotation, and every ball is in a group once. All replicates
+    # of a group are then a few products of arrays, and sums over balls are plain additions to
+    # columns.
     less = _turns_less_one(at.rotations)
     for group in shared.groups:
         k = group.position
@@ -252,6 +261,8 @@ def _gradient(shared: Reference, drawn: Draw, at: Deviations) -> tuple[Array, Ar
         squares += np.einsum("bim,bim->b", pull, pull)
         pull *= group.weight
         by_pose[:, k, :d] -= pull.sum(axis=2)
+        # A turn moves a ball by its cross product with the arm, so that the gradient by it is a
+        # moment.
         by_pose[:, k, d:] -= _moment(arm, pull)
         by_ball[:, :, group.ball] -= np.swapaxes(rotation, -1, -2) @ pull
         by_shared[:, layout.model] += group.model.gather(
@@ -313,6 +324,8 @@ def _turn_less_one(turn: Array) -> Array:
     relative accuracy.
     """
     if turn.shape[1] == 1:
+        # cos t - 1 = -2 sin^2 (t / 2), without the difference, of which a small turn would leave no
+        # digits.
         s, half = np.sin(turn[:, 0]), np.sin(0.5 * turn[:, 0])
         less = -2.0 * half**2
         return np.stack([np.stack([less, -s], axis=1), np.stack([s, less], axis=1)], axis=1)
@@ -335,6 +348,8 @@ def _turns_less_one(turns: Array) -> Array:
 def _moment(arm: Array, pull: Array) -> Array:
     """Return the sum over m of arm x pull, both (b, d, m): (b, 3), in the plane (b, 1)."""
     planes = [(0, 1)] if pull.shape[1] == 2 else [(1, 2), (2, 0), (0, 1)]
+    # A sum of cross products is the antisymmetric part of one product of matrices, so that no
+    # vector is formed for each reading.
     products = np.einsum("bim,bjm->bij", arm, pull)
     return np.stack([products[:, i, j] - products[:, j, i] for i, j in planes], axis=1)
 
@@ -395,6 +410,9 @@ def _lengths(
     if lengths.free is not None and is_free:
         changed = at.shared[:, layout.lengths][:, lengths.free]
         expected = expected + np.where(lengths.free >= 0, changed, 0.0)
+    # Lengths are non-linear in the corrected points, and are formed before they are whitened. The
+    # transpose of the whitening leads back from residuals to a force along each length, and this
+    # acts on both of its ends.
     residual = white.whitened((length - expected).T)
     squares += (residual**2).sum(axis=0)
     pull = unit * white.pulled(residual).T[:, None]
@@ -420,6 +438,10 @@ def _step(reference: Reference, by_ball: Array, by_shared: Array) -> tuple[Array
     """Solve R'R step = -gradient for all replicates: steps of the balls (b, d, n), shared
     parameters (b, s), zero along held directions.
     """
+    # With the factor R of balls and shared parameters, R' z = gradient is solved first, by balls,
+    # then for what they leave of the shared ones. R step = z follows in the opposite order. Where
+    # directions are held, the root of the covariance takes the place of the shared triangle: it has
+    # none of them.
     factor = reference.factor
     b, d, n = by_ball.shape
     e, s = len(factor.eliminated), by_shared.shape[1]

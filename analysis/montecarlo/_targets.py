@@ -77,6 +77,7 @@ def targets(shared: Reference) -> tuple[MonteCarloQuantity, ...]:
     for symbol, kind in QUANTITIES.items():
         for functions in functions_of(symbol, at.design, at.layout) if kind.in_replicates else ():
             if isinstance(functions, Parameters):
+                # A true machine of another model has no values of these parameters.
                 has_truth = (
                     shared.truth.model == at.design.model
                     or not functions.rows[:, at.layout.model].any()
@@ -160,6 +161,8 @@ def _parameters(
     # Parameters of another true model are not comparable; the functions then exclude the model's.
     a = start.a - real.a if shared.truth.model == design.model else start.a
     offsets = start.probes - real.probes
+    # The error of the estimate without noise is written as if it were a replicate's deviation, so
+    # that one function serves both.
     steps = np.zeros((1, len(layout)))
     steps[:, layout.lengths] = start.lengths - real.lengths
     steps[:, layout.influences] = start.influences - real.influences

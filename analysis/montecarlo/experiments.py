@@ -86,6 +86,7 @@ def accuracy_of(total: Accumulator) -> float:
     n = total.count
     worst = 0.0
     for sums in total.quantities:
+        # These are squares: to first order the ratio has half their relative standard error.
         mean = sums.numbers[0] / n
         variance = max(sums.numbers_squared[0] / n - mean**2, 0.0) * n / (n - 1)
         worst = max(worst, float(np.sqrt(variance / n) / (2.0 * mean)))
@@ -112,6 +113,8 @@ def _parts(
     shared: Reference, aims: tuple[MonteCarloQuantity, ...], seed: int, trials: int, workers: int
 ) -> Iterator[Accumulator]:
     tasks = range(-(-trials // TASK))
+    # Results come in the order of tasks, whichever worker is first, so that sums have the same
+    # bits.
     arguments = ((shared, aims, seed, task, trials) for task in tasks)
     return in_processes(sum_of_task, arguments, min(workers, len(tasks)))
 

@@ -164,6 +164,7 @@ def _comparison(aim: MonteCarloQuantity, sums: QuantityAccumulator, n: int) -> M
     ]
 
     def root(index: int) -> MonteCarloEstimate:
+        # To first order a root has half the relative standard error of its square.
         value = float(np.sqrt(means[index]))
         return MonteCarloEstimate(value, errors[index] / (2.0 * value) if value else 0.0)
 

@@ -48,6 +48,9 @@ def deformation(places: Array, displacement: Array) -> str:
     >>> deformation(square, square * [1.0, -1.0])
     'stretches along its x and shrinks along its y'
     """
+    # A deformation is described by its linear part, as stretches and shears, and by what is left of
+    # it, as bending or distortion. A part with less than two per cent of the sum of squares has no
+    # words.
     n, d = places.shape
     moved = without_rigid_motion(places, displacement[:, :, None])[:, :, 0]
     total = float((moved**2).sum())
@@ -60,6 +63,7 @@ def deformation(places: Array, displacement: Array) -> str:
     words = []
     if above(((centred @ linear.T) ** 2).sum(), 0.02 * total):
         names = ("x", "y", "z")
+        # A plate has no extent across its plane, so that no stretch is seen there.
         stretch = np.array([linear[i, i] * (extent[i] > 0) for i in range(d)])
         flat = [i for i in range(d) if extent[i] > 0]
         largest = np.abs(linear).max()
@@ -105,6 +109,8 @@ def signed(
     design: Design, layout: SharedLayout, shared: Array, balls: Array
 ) -> tuple[Array, Array]:
     """Return a direction without rounding errors, its first change positive."""
+    # A direction has no sign of its own. The first change that is printed is made positive, so that
+    # the same design has the same words everywhere.
     shared, balls = _less_rounding(layout, shared, balls)
     direction = described(design, layout, shared, balls)
     if direction.functions:
@@ -206,6 +212,7 @@ def _function_parts(
             continue
         parameter = parameters[members[0]]
         if isinstance(model, HasLines):
+            # Size and shape of a curve are those of its values: coefficients depend on the basis.
             t = np.linspace(0.0, 1.0, 201)
             lines = model.lines(name, t)
             values = np.stack([line.basis @ a[members] for line in lines])
@@ -215,6 +222,7 @@ def _function_parts(
         else:
             peak, form = float(a[members[0]]), ""
         meaning = parameter.meaning
+        # A straightness error that is a straight line is an axis out of square, and is called that.
         if form == "linear" and name in AXIS_ERRORS and AXIS_ERRORS[name].is_straightness:
             meaning, form = AXIS_ERRORS[name].slope_meaning, ""
         function_part = FunctionPart(name, meaning, peak, parameter.unit, form)

@@ -22,6 +22,12 @@ if TYPE_CHECKING:
     from .directions import Direction
 
 
+# Rounding decides the basis that a decomposition gives of the null space, and no reader could
+# compare two. The projector onto the space does not depend on it. The parameter with the largest
+# diagonal element of the projector has most freedom. It becomes a pivot, the projector of the
+# directions that leave it unchanged is formed, and so on. With these pivots the directions have one
+# reduced echelon form. Each of them is elementary: no undetermined direction involves only some of
+# its parameters.
 def elementary_mixture(directions: Array) -> Array:
     """Return mixtures (k, k) that make elementary directions of linearly independent ones (s, k),
     in comparable units.
@@ -52,6 +58,8 @@ def principal_directions(
     the largest last; those of equal effects are made elementary, in units of `scale` (s,).
     """
     root, size = root.copy(), np.sqrt((effect**2).sum(axis=0))
+    # Of equal singular values any rotated set of vectors is as good. Their effects on corrected
+    # points choose one, unless these are equal, too.
     for group in _equal(values):
         if len(group) > 1:
             _, lengths, turned = svd(np.linalg.qr(effect[:, group], mode="r"))
@@ -204,6 +212,8 @@ def _weak_roots(at: Linearisation, target: Target | None) -> tuple[Array, Array]
     on corrected points.
     """
     limit = weak_limit(at.design, target)
+    # Relative to one another: a motion of all corrected points as one body is no error of the
+    # machine.
     change = relative_changes(at.design, at.layout, at.shared)
     # All directions together have less effect than that: none is weak.
     if 2.0 * (change**2).sum() <= 0.5 * limit**2 * change[:, :, :1].size:

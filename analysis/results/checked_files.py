@@ -72,6 +72,7 @@ def _predict(experiment: Experiment, design: Design, with_quantities: bool) -> P
         quantities = uncertainties(at, target=target)
         lengths = quantities.get("U6")
     else:
+        # A check states U6 alone, and computes no other quantity.
         lengths = uncertainties(at, target=target, symbols=("U6",)).get("U6")
     return Prediction(
         experiment.label,
@@ -129,6 +130,8 @@ class Wanted:
         """The trust in a file."""
         if self.with_modules:
             return OPENED
+        # A file below the current folder may name any file there, another one those in its own
+        # folder.
         here, folder = Path.cwd(), path.resolve().parent
         within = here if folder.is_relative_to(here) else folder
         return Trust(within=within, remedy=WITH_MODULES)
@@ -219,6 +222,7 @@ def checked_design(
     steps: tuple[str, ...] = (
         ("expected_rank_deficiency",) if prediction.verdict.complaint else ("target_uncertainty",)
     )
+    # The line of the file that a complaint is about, as far as there is one.
     if not prediction.verdict.complaint and {goal.kind for goal in wanted.goals} == {"tasks"}:
         steps = ("evaluation", "tasks")
     return replace(design, place=experiment.place(steps))

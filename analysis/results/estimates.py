@@ -135,10 +135,14 @@ class EstimatedFunctions:
         if len(of_balls):
             ball, axis = self.ball[of_balls], self.axis[of_balls]
             ball_columns = at.balls.common.shape[2] - common.shape[1]
+            # Shared parameters do not depend on the variables of the kept balls, which follow
+            # theirs.
             common = np.concatenate([common, np.zeros((len(common), ball_columns))], axis=1)
             common[of_balls] = at.balls.common[ball, axis]
         result = common @ common.T
         if len(of_balls):
+            # Two co-ordinates of one ball share the part of its own rows; those of different balls
+            # do not.
             ball_root = at.balls.own[ball, axis]
             result[np.ix_(of_balls, of_balls)] += np.where(
                 ball[:, None] == ball, ball_root @ ball_root.T, 0.0
@@ -247,6 +251,8 @@ def estimated_functions(at: Linearisation, monomials: bool) -> EstimatedFunction
     ball[len(functions) - len(names) :] = np.repeat(balls, d)
     axis = np.where(ball < 0, -1, (np.arange(len(ball)) - len(ball)) % d)
 
+    # All functions so far are parameters, or linear in them, and have the same derivatives at the
+    # nominal design. Tasks are distances, whose derivatives depend on the state.
     drawn, count = list(rows), len(design.tasks.names)
     if count:
         distances = task_distances(design)
@@ -341,6 +347,8 @@ def correct(at: Linearisation, points: Array, probes: Integers, sigma: float) ->
         else correction_rows(at.design, at.layout, at.drawn.state, points, probes)
     )
     flat = rows.reshape(-1, len(at.layout))
+    # Whether a correction is determined is judged at the nominal design: at the estimate, noise
+    # makes null directions appear to be determined.
     is_open = np.isnan(at.of_shared(flat, drawn.reshape(flat.shape))).reshape(points.shape)
     root = np.where(is_open[:, :, None], np.nan, sigma * (rows @ at.shared))
     return CorrectedPoints(corrected_points(at.design, at.state, points, probes), root)

@@ -47,6 +47,8 @@ def fit(
     design = observed.design
     solution = estimate(design, observed.x) if campaigns is None else campaigns.solution
     if solution.status != "converged":
+        # Without an estimate there is no linearisation of the fit. The rank is that of the nominal
+        # design with the readings that were made.
         judged = check(experiment, design).verdict
         names = experiment.label, experiment.title
         return Fit(
@@ -86,6 +88,8 @@ def _sigma(
     squares, freedom = at.factor.sum_of_squares, at.degrees_of_freedom
     if campaigns is not None:
         squares, freedom = campaigns.sum_of_squares, campaigns.freedom
+    # Without degrees of freedom there are no residuals to estimate sigma from, and uncertainties
+    # are taken as stated.
     estimated = is_estimated and freedom > 0
     sigma = float(np.sqrt(squares / freedom)) if estimated else 1.0
     return sigma, estimated, freedom if campaigns is None else campaigns.degrees_of_freedom

@@ -151,6 +151,9 @@ def plate_coordinates(
         coordinates, rotation = in_plate_axes(at.state.balls[balls], axes)
         across = 1 - axes.axis
         n = len(balls)
+        # A co-ordinate in the plate's axes depends on its own ball, on that at the origin and on
+        # that which the axis goes through. The part of errors that balls have in common is added up
+        # before it is squared. The parts of the three balls alone are independent.
         weights = _weights(coordinates, axes)
         common, ball_root = rotation @ at.balls.common[balls], rotation @ at.balls.own[balls]
         moved = common + sum(weight @ common[k] for k, weight in weights.items())

@@ -82,6 +82,9 @@ def pair_tiles(moved: Displacements) -> Iterator[PairTile]:
     Coincident points make no pair. Memory is that of a tile.
     """
     places, common, null, drawn = relative(moved)
+    # The variance of a distance between i and j, along the unit vector u, is u' (C_ii + C_jj - C_ij
+    # - C_ji) u. The blocks C_ii are formed once for all points, those of two points only within a
+    # tile.
     single = common @ common.transpose(0, 2, 1) + moved.own @ moved.own.transpose(0, 2, 1)
     work = np.empty((5 + places.shape[1], min(TILE, len(places)) ** 2))
     for rows, columns in _tiles(len(places)):
@@ -110,6 +113,9 @@ def pairs_of(moved: Displacements, pairs: Integers) -> PairTile:
     return PairTile(pairs[:, 0], pairs[:, 1], lengths, np.sqrt(variance), open_)
 
 
+# A motion of all points as one body changes no distance, and may be far larger than the rest. Taken
+# out first, it costs no digits in the differences of pairs. Nor does it set the measure of what
+# counts as rounding, see `open_above`.
 def relative(moved: Displacements) -> tuple[Array, Array, Array, Array]:
     """Return points, displacements and those along undetermined directions without rigid motion,
     and nominal points.
@@ -145,6 +151,9 @@ def _tile(
     n, m, d = rows.stop - rows.start, columns.stop - columns.start, places.shape[1]
     # Arrays allocated once: allocating takes as long as computing.
     views = [buffer[: n * m].reshape(n, m) for buffer in work]
+    # For a tile of n by m pairs, every component of C_ij is one product of n rows and m columns.
+    # The sum over components is accumulated with the differences of co-ordinates as weights, and
+    # divided by the squared length at the end.
     product, term, along, weighted, squared, *difference = views
     for axis in range(d):
         np.subtract(places[rows, None, axis], places[None, columns, axis], out=difference[axis])
@@ -156,6 +165,8 @@ def _tile(
         along[:] = 0.0
         for j in used[k:]:
             np.matmul(common[rows, i], common[columns, j].T, out=product)
+            # The components (i, j) and (j, i) of C_ij + C_ji. In a tile of the diagonal the second
+            # product is the transpose of the first.
             if i == j:
                 transposed = product
             elif diagonal:
@@ -171,6 +182,7 @@ def _tile(
                 along += term
         along *= difference[i]
         weighted += along
+    # Every pair once, and none of coincident points.
     chosen: Flags = np.triu(squared > 0, 1) if diagonal else squared > 0
     lengths = squared[chosen]
     values = np.sqrt(np.maximum(weighted[chosen] / lengths, 0.0))

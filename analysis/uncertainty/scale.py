@@ -90,6 +90,9 @@ def scale_of(experiment: Experiment, at: Linearisation) -> Scale | None:
     if np.isnan(uncertainty):
         return None
     stretches = can_stretch(at.design, at.state)
+    # A source is what the scale is less certain without: each is left out in turn, and the design
+    # linearised again. Where several carry the scale, each alone may be dispensable, and then all
+    # are named.
     groups = list(_groups(experiment))
     if len(groups) == 1 and stretches:
         # Readings alone do not determine scale, so that this is the only source.
@@ -208,6 +211,9 @@ def _stretches(model: ErrorModel, points: Array, a: Array, offset: Array) -> boo
     offsets = np.broadcast_to(offset, points.shape)
     jacobian = model.jacobian(points, a, offsets)
     centred = points - points.mean(axis=0)
+    # A stretch is a displacement in proportion to the distance from the centroid, up to a shift. It
+    # belongs to the model if its columns, less their shifts, have it as a combination. Columns are
+    # of unit length, since parameters have different units.
     columns = (jacobian - jacobian.mean(axis=0)).reshape(centred.size, -1)
     size = np.linalg.norm(columns, axis=0)
     columns = columns[:, size > 0] / size[size > 0]

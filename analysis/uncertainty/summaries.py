@@ -181,6 +181,7 @@ def _of_pairs(
     target: Target | None,
 ) -> Quantity | None:
     """Return the quantity of distances between all points of each group; None if all coincide."""
+    # Pairs have standard uncertainties, and are compared with the target for these.
     limit = None if target is None else target.standard
     pairs = sum(
         (all_pairs(moved, places.labels, limit, sigma) for places, moved in groups), PairSummary()
@@ -189,6 +190,8 @@ def _of_pairs(
         return None
     quantity = Quantity(symbol, np.nan, np.nan, "m", pairs.count, pairs.undetermined)
     places = groups[0][0]
+    # With undetermined pairs maximum and average stay NaN: those of the rest would be of a part
+    # that differs from design to design.
     if not pairs.undetermined:
         where = " to ".join(places.name(design, label) for label in pairs.where)
         average = sigma * pairs.total / pairs.count

@@ -204,6 +204,8 @@ def displacements(
         _as_slice(moving_columns(linearisation.layout, places)),
         linearisation.shared_null.shape[1],
     )
+    # Only the parameters that move points count, and so few variables suffice for all of them. The
+    # covariances of all pairs are products with as many terms as there are variables.
     root = linearisation.shared[columns]
     if narrow:
         # A root of the same covariance: a triangle's has columns of zeros, or another one is found.
@@ -217,6 +219,8 @@ def displacements(
         common[some, :, : root.shape[1]] = (moving @ root).reshape(len(rows), d, root.shape[1])
         if not nulls:
             continue
+        # Whether a point is determined is judged at the nominal design, where the null directions
+        # are.
         if linearisation.drawn is not None:
             rows = correction_rows(
                 design, linearisation.layout, drawn, places.points[some], places.probes[some]
@@ -261,6 +265,8 @@ def linear_functions(linearisation: Linearisation, functions: Functions) -> Line
     >>> linear_functions(at, length).shared.shape == (1, len(at.layout))
     True
     """
+    # Distances have other derivatives at the nominal state, at which they are tested for changes
+    # along null directions. Parameters are the same functions at both.
     derivatives = _derivatives(linearisation, linearisation.state, functions)
     if linearisation.drawn is None or isinstance(functions, Parameters):
         return derivatives

@@ -55,6 +55,7 @@ class Linearisation:
     @property
     def degrees_of_freedom(self) -> int:
         """Observations less the parameters that they determine."""
+        # An undetermined direction uses up no observation.
         return self.count - self.design.parameter_count + self.deficiency
 
     @property

@@ -90,6 +90,8 @@ def limits_of(
     for indices, names in readings:
         around = extent(balls[indices])
         for name in names:
+            # The volume limits scale readings, which are the balls less the offset of the probe.
+            # Reach limits the balls themselves.
             offset = bounds.probes[name].offset if name in bounds.probes else 0.0
             shifts[OUTSIDE].append(ends + offset - around)
             if name in bounds.reach:
@@ -139,6 +141,7 @@ def entered(around: Array, boxes: Array) -> Any:
     """Return which of boxes (n, 2, d) each artefact enters (…, n), by its ends `around` (…, 2, d);
     what touches a box does not enter it.
     """
+    # Two boxes overlap unless one is beyond the other along some axis.
     low, high = around[..., None, 0, :], around[..., None, 1, :]
     is_beyond = (low >= boxes[:, 1] - TOLERANCE) | (high <= boxes[:, 0] + TOLERANCE)
     return ~is_beyond.any(axis=-1)

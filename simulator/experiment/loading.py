@@ -94,6 +94,8 @@ def load(
             base_problems.add(("variants", name), text)
             break
         for message in messages:
+            # A fault of the common part is in every variant, and is reported once, with the
+            # variants in which it holds.
             variants_of.setdefault(message, []).append(name)
     found = base_problems.messages + [
         replace(message, text=message.text + in_variants(names, list(trees)))
@@ -169,6 +171,7 @@ def build(
     try:
         sections = validate_sections(root, problems, planning)
         resolved = resolve(sections, source.parent, problems, trust, planning)
+    # Collected faults are no exceptions, except when they become too many to be worded.
     except ExperimentError as too_many:
         return None, list(too_many.messages)
     faults = problems.messages

@@ -53,6 +53,9 @@ def vector_from_rotation(rotation: Array) -> Array:
     """
     if rotation.shape[1] == 2:
         return np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])[:, None]
+    # The antisymmetric part is 2 sin(t) times the axis, and the trace 1 + 2 cos(t). Both together
+    # give the angle to full accuracy: near 0 the cosine has no digits of it, near a right angle the
+    # sine.
     double_sine = np.stack(
         [
             rotation[:, 2, 1] - rotation[:, 1, 2],
@@ -117,6 +120,7 @@ def rigid_motions(points: Array) -> Array:
     n, d = points.shape
     motions = np.zeros((n, d, d * (d + 1) // 2))
     motions[:, range(d), range(d)] = 1.0
+    # In this order the turn about z is the first, in space as in the plane.
     planes = [(0, 1), (1, 2), (2, 0)] if d == 3 else [(0, 1)]
     for column, (i, j) in enumerate(planes, start=d):
         motions[:, i, column], motions[:, j, column] = -points[:, j], points[:, i]

@@ -422,6 +422,7 @@ class _Builder:
             except ValueError as error:
                 self.refuse(mark, str(error))
                 value = 0
+        # An empty document has an empty scalar for its content.
         if value is None and self.root is None and not self.stack:
             return
         self._add(Scalar(mark, value), event.anchor)
@@ -449,6 +450,9 @@ class _Builder:
 
     def _alias(self, anchor: str, mark: Mark) -> None:
         if anchor in self.anchors:
+            # An alias shares the node, and costs nothing here. But whoever walks the tree meets all
+            # of it again, and a few lines could name billions of values: its size counts as if it
+            # were written out.
             node, size, height = self.anchors[anchor]
             self._add(replace(node, mark=mark), None, size, height)
             return

@@ -160,6 +160,8 @@ class Polynomial:
         envelope = [0.0, 1.0, -1.0] if self.zero_at_one else [0.0, 1.0]
         matrix = np.zeros((max(self.coefficients - 1, 0), self.size))
         for k in range(self.size):
+            # T_k as a polynomial of s = 2 t - 1, which is expanded in t and multiplied by the
+            # envelope. Results are quoted so, while estimates keep the stable form.
             in_s = chebyshev.cheb2poly([0.0] * k + [1.0])
             in_t = np.array([0.0])
             for power_, coefficient in enumerate(in_s):

@@ -83,6 +83,8 @@ def combine_standards(
     since its ball may have moved.
     """
     on_plate = design.artefacts.is_plate[design.balls.artefact[readings.ball]]
+    # A length has one reading at each end, and repeats of standards are averaged for that. Repeats
+    # on plates are observations themselves, and stay rows of their own.
     groups: dict[tuple[int, ReadingKey], list[int]] = {}
     keys = list(zip(rows_of(design, design, readings), reading_keys(readings), strict=True))
     of_gauge = np.isin(readings.position, design.gauge_positions)
@@ -150,6 +152,8 @@ def _with_radii(
     direction = np.empty_like(points)
     for k in np.unique(readings.position[carried]):
         rows = readings.position[carried] == k
+        # From the pivot that the readings themselves show: about the nominal one directions would
+        # be off by its error.
         away = points[rows] - fit_sphere(points[rows], design.positions.origins[k])[0]
         direction[rows] = away / np.sqrt((away**2).sum(axis=1))[:, None]
         nominal = radii.direction[planned[planned_gauge == gauge[rows][0]]]

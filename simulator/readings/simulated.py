@@ -35,6 +35,8 @@ def scale_readings(model: ErrorModel, true: Array, a: Array, p: Array) -> Array:
 
     :raises NoReadingError: the errors are too large for the iteration x <- true - e(x) to settle.
     """
+    # The scales show where the corrected point is at the ball: x + e(x) = true. Errors change by
+    # far less than a reading does, so that each pass shortens the rest by that ratio.
     x = true - p
     rounding = 4e-16 * max(1.0, float(np.abs(true).max(initial=0.0)))
     with np.errstate(over="ignore", invalid="ignore"):

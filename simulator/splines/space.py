@@ -155,10 +155,13 @@ class SplineSpace:
             )
         if derivative >= self.order:
             return np.zeros((len(x), self.count))
+        # At a break the piece above or below it is taken, of which the derivative is wanted.
         piece = np.searchsorted(self.breaks, x, "right" if side == "above" else "left") - 1
         piece = np.clip(piece, 0, len(self.breaks) - 2)
         u = ((x - self.breaks[piece]) / self.length)[:, None]
         row_values = np.zeros((len(x), self.count))
+        # Horner's rule for the derivative of the Taylor polynomial: u^k has the factor k (k - 1)
+        # ... .
         for k in range(self.order - 1, derivative - 1, -1):
             factor = float(np.prod(np.arange(k - derivative + 1, k + 1)))
             row_values = row_values * u + factor * self.pieces[piece, k]

@@ -162,6 +162,9 @@ def _constrained(space: SplineSpace, constraints: tuple[Constraint, ...]) -> tup
     matrix, values = rows(space, constraints)
     if not constraints:
         return np.zeros(space.count), np.eye(space.count)
+    # Pivoting takes independent conditions first. These determine the particular solution, and the
+    # remaining columns of Q are the directions that no condition sees. A condition that depends on
+    # those taken is met by this solution already, or contradicts them.
     q, r, order = qr(matrix.T, pivoting=True)
     rank = int((np.abs(np.diag(r)) > NOTHING).sum())
     determined_columns, free_columns = order[:rank], sorted(order[rank:].tolist())
@@ -190,6 +193,8 @@ def _refuse_undetermined(space: SplineSpace, x: Array, design: Array, null: Arra
     """
     if null.shape[1] == 0:
         return
+    # The triangle has the singular values of all points' rows. Its null directions, as curves, are
+    # zero in the pieces that the points determine, and so name the others.
     _, values, directions = svd(np.linalg.qr(design, mode="r"), full_matrices=True)
     rank_known = int(
         (values > UNDETERMINED * max(float(values.max(initial=0.0)), UNDETERMINED)).sum()

@@ -76,6 +76,7 @@ class JointWhitening:
         """Add the transpose of `whitened`, of `rows` (len, k), to `into` (lengths, k)."""
         first, known_part = np.split(rows, [len(self.by_known)])
         first = first - self.shared @ (self.gain[:, None] * (self.shared.T @ first))
+        # The steps of `whitened` in reverse order, each transposed.
         by_mean = self.known.T @ (known_part - self.by_known.T @ first)
         start = 0
         for lengths, root, _ in self.together:

@@ -202,6 +202,8 @@ class Stars(Observations):
         first = 0
         for star, probes, basis in zip(self.stars, self.probes, self.bases, strict=True):
             star_columns = slice(first, first + basis.shape[1])
+            # A force on a tip in the star's frame, turned into the machine's. The rotation itself
+            # adds nothing: the sum of squares is least there.
             pull = (residual[:, star_columns] / self.uncertainty[star_columns]) @ basis.T
             turned = pull.reshape(len(pull), *star.coordinates.shape) @ star.rotation(
                 offsets[:, probes]
