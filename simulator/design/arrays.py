@@ -235,7 +235,9 @@ class Observations(ABC):
 
     @classmethod
     def joined(cls, parts: Sequence[Observations]) -> Self:
-        """The observations of all parts, of this kind, together."""
+        """The observations of all parts, of this kind, together; kinds with other fields than
+        arrays (m, ...) override it.
+        """
         # Fields are joined in the order of their declaration, in which the class takes them.
         columns = zip(*(vars(part).values() for part in parts), strict=True)
         return cls(*(np.concatenate(column) for column in columns))

@@ -21,11 +21,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from ballplate.simulator.computing.processes import scipy_linalg, single_threaded
-from ballplate.simulator.design.arrays import Design, Rows
+from ballplate.simulator.design.arrays import Design, Rows, measured
 from ballplate.simulator.design.measurement import ensure_rows
 from ballplate.simulator.design.observations.readings import reading_blocks, reading_weights
 from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.design.state import State
+from ballplate.simulator.inputs.extensions import UnusableError
 from ballplate.simulator.machines.protocol import Array, Integers
 
 # Rows handled at once: enough for the matrix products to be efficient, few enough to stay in cache.
@@ -129,9 +130,11 @@ def eliminate(design: Design, layout: SharedLayout, state: State, x: Array | Non
     the machine is taken to read without error, as for planning.
 
     :raises UnmatchedReadingsError: `x` has other rows.
+    :raises UnusableError: a plate's ball has fewer rows of its own than co-ordinates.
     """
     if x is not None:
         ensure_rows(design, design.readings, x)
+    _ensure_own_rows(design)
     if _differ(design, state):
         return _eliminate_graded(design, layout, state, x)
     return _eliminate_alike(design, layout, state, x)
@@ -197,6 +200,24 @@ def _eliminate_alike(design: Design, layout: SharedLayout, state: State, x: Arra
         side=triangle[columns:-1, -1],
         sum_of_squares=total,
     )
+
+
+def _ensure_own_rows(design: Design) -> None:
+    """Refuse balls of plates whose own rows cannot determine them.
+
+    Each R_i has to be regular: the rank is judged by the shared factor alone, which would be full
+    beside a ball that nothing determines.
+    """
+    plate = design.readings.select(design.plate_readings)
+    count = len(design.balls.names)
+    rows = np.bincount(plate.ball, measured(design, plate).sum(axis=1), count)
+    for observation in design.observations:
+        if len(observation) and observation.balls.shape[1] == 1:
+            rows += np.bincount(observation.balls[:, 0], minlength=count)
+    loose = design.plate_balls[rows[design.plate_balls] < design.dimension]
+    if len(loose):
+        text = "has fewer readings than co-ordinates; read it, or leave it out of its artefact"
+        raise UnusableError(f"ball {design.ball_label(int(loose[0]))} {text}")
 
 
 def _differ(design: Design, state: State) -> bool:

@@ -29,7 +29,7 @@ from .linearisation import Linearisation, linearise
 
 Status = Literal["converged", "not converged", "diverged"]
 
-# A step of more than this (m, rad) along what the drawn design leaves open has left the
+# An estimate with a longer step than this (m, rad), along whatever directions, has left the
 # neighbourhood of the drawing.
 NEIGHBOURHOOD = 0.01
 

@@ -35,6 +35,7 @@ from ballplate.simulator.design.observations.joint_values import JointValues
 from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.geometry.artefacts import BryanGaugeSettings
 from ballplate.simulator.geometry.motions import pose_size
+from ballplate.simulator.inputs.extensions import UnusableError
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.number_arrays import Integers
 from ballplate.simulator.inputs.yamltree import Mark
@@ -53,7 +54,7 @@ DEFAULT_POINTS = 200
 DEFAULT_SEED = 1
 
 # Directions below this fraction of the largest do not count when a frame is fixed or a line
-# recognised.
+# recognised, nor motions of unit length whose square is below it in what is not held yet.
 FLAT = 1e-9
 
 
@@ -287,6 +288,9 @@ def _stated(experiment: Experiment, first_ball: dict[str, int]) -> list[Observat
                 parts.setdefault(type(observed), []).append(observed)
             elif isinstance(observed, BallObservations):
                 joint.append((observed, root))
+            else:
+                text = "values of the machine cannot be correlated; leave their covariance out"
+                raise UnusableError(f"calibration of {item.subject}: {text}")
     for name, artefact in experiment.artefacts.items():
         if artefact.flatness is not None:
             parts[CalibratedCoordinates].append(

@@ -88,7 +88,9 @@ class ErrorModel(Protocol):
         ...
 
     def jacobian(self, x: Array, a: Array, p: Array) -> Array:
-        """Return the derivative of the correction by a, (m, d, n)."""
+        """Return the derivative of the correction by a, (m, d, n): a new array, which the caller
+        may change.
+        """
         ...
 
     def reported(self) -> Reported:
