@@ -185,11 +185,11 @@ def check_files(
             doubts = tuple(dict.fromkeys(doubt for variant in chosen for doubt in variant.doubts))
             notes = tuple(dict.fromkeys(note for variant in chosen for note in variant.notes))
             is_single = len(chosen) == 1
-            designs = chosen if is_single else counted(chosen, "designs", len(chosen), within)
+            experiments = chosen if is_single else counted(chosen, "designs", len(chosen), within)
             of_search = within if is_single else unreported
             judged = tuple(
-                checked_design(design, pools.get(design.name), wanted, of_search)
-                for design in designs
+                checked_design(experiment, pools.get(experiment.name), wanted, of_search)
+                for experiment in experiments
             )
             yield CheckedFile(str(path), judged, (), doubts, notes)
         except ExperimentError as error:
@@ -216,16 +216,16 @@ def checked_design(
     if wanted.nothing_weak and prediction.verdict.weak:
         count = len(prediction.verdict.weak)
         missed += (number_of(count, "weakly determined direction"),)
-    design = advised(CheckedDesign(prediction, None, suggestions, goals, missed, experiment.name))
-    if not design.complaints:
-        return design
+    checked = advised(CheckedDesign(prediction, None, suggestions, goals, missed, experiment.name))
+    if not checked.complaints:
+        return checked
     steps: tuple[str, ...] = (
         ("expected_rank_deficiency",) if prediction.verdict.complaint else ("target_uncertainty",)
     )
     # The line of the file that a complaint is about, as far as there is one.
     if not prediction.verdict.complaint and {goal.kind for goal in wanted.goals} == {"tasks"}:
         steps = ("evaluation", "tasks")
-    return replace(design, place=experiment.place(steps))
+    return replace(checked, place=experiment.place(steps))
 
 
 def advised(design: CheckedDesign) -> CheckedDesign:

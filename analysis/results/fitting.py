@@ -55,7 +55,7 @@ def fit(
             *names, observed, solution, judged, 1.0, False, 0, {}, (), (), experiment=experiment
         )
     at = linearised_fit(design, solution)
-    scale, estimated, freedom = _sigma(at, campaigns, is_estimated)
+    sigma, estimated, freedom = _sigma(at, campaigns, is_estimated)
     diagnosis, untested = diagnosed(at, observed.x, estimated, observed.marks)
     judged = verdict(at, experiment.expected_rank_deficiency, experiment.target_uncertainty)
     functions = estimated_functions(at, monomials)
@@ -65,14 +65,14 @@ def fit(
         observed,
         solution,
         judged,
-        scale,
+        sigma,
         estimated,
         freedom,
-        uncertainties(at, scale, experiment.target_uncertainty),
-        parameter_estimates(functions, scale),
+        uncertainties(at, sigma, experiment.target_uncertainty),
+        parameter_estimates(functions, sigma),
         largest_residuals(design, solution, observed.x),
-        plate_coordinates(experiment, at, scale),
-        _adjustments(at, scale, freedom if estimated else np.inf),
+        plate_coordinates(experiment, at, sigma),
+        _adjustments(at, sigma, freedom if estimated else np.inf),
         diagnosis,
         untested,
         functions,

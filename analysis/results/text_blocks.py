@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 # Format of sums of squares.
-FIVE = "{:.5e}".format
+SQUARES = "{:.5e}".format
 
 
 def _counted(quantity: Quantity) -> str:
@@ -154,14 +154,16 @@ def verdict_lines(
     return lines
 
 
-def iteration_lines(record: Sequence[Iteration], shown: Callable[[float], str] = FIVE) -> list[str]:
+def iteration_lines(
+    record: Sequence[Iteration], shown: Callable[[float], str] = SQUARES
+) -> list[str]:
     """Return the record of iterations as lines of text, with steps as `shown`."""
     from ballplate.presentation.table_columns import table_lines
 
     columns = {
         "iteration": range(len(record)),
         "step": ([None, *(iteration.step for iteration in record[1:])], shown),
-        "S^2": ("sum_of_squares", FIVE),
+        "S^2": ("sum_of_squares", SQUARES),
     }
     return table_lines(columns, record)
 

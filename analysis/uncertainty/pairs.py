@@ -184,8 +184,8 @@ def _tile(
         weighted += along
     # Every pair once, and none of coincident points.
     chosen: Flags = np.triu(squared > 0, 1) if diagonal else squared > 0
-    lengths = squared[chosen]
-    values = np.sqrt(np.maximum(weighted[chosen] / lengths, 0.0))
+    squares = squared[chosen]
+    values = np.sqrt(np.maximum(weighted[chosen] / squares, 0.0))
     open_ = np.zeros(len(values), bool)
     if null.shape[2]:
         difference_drawn = drawn[rows, None] - drawn[None, columns]
@@ -193,11 +193,11 @@ def _tile(
             difference_drawn[:, :, i, None] * (null[rows, None, i, :] - null[None, columns, i, :])
             for i in range(d)
         )
-        length = (difference_drawn**2).sum(axis=2)
-        size = np.sqrt((np.asarray(change) ** 2).sum(axis=2) / np.where(length > 0.0, length, 1.0))
+        square = (difference_drawn**2).sum(axis=2)
+        size = np.sqrt((np.asarray(change) ** 2).sum(axis=2) / np.where(square > 0.0, square, 1.0))
         open_ = size[chosen] > open_above(null)
     first, second = np.nonzero(chosen)
-    return PairTile(rows.start + first, columns.start + second, np.sqrt(lengths), values, open_)
+    return PairTile(rows.start + first, columns.start + second, np.sqrt(squares), values, open_)
 
 
 def _summary(

@@ -98,11 +98,11 @@ def scale_of(experiment: Experiment, at: Linearisation) -> Scale | None:
         # Readings alone do not determine scale, so that this is the only source.
         carriers = [Carrier(groups[0][0], np.inf)]
     else:
-        uncertainties = ((scale_uncertainty(without), words) for words, without in groups)
+        uncertainties = ((scale_uncertainty(reduced), words) for words, reduced in groups)
         sources = sorted(uncertainties, reverse=True)
         significant = [source for source in sources if source[0] > CARRIES * uncertainty]
         chosen = significant or (sources if stretches else [])
-        carriers = [Carrier(words, without) for without, words in chosen]
+        carriers = [Carrier(words, remaining) for remaining, words in chosen]
     rests = any(
         carrier.words == EXACT_OFFSETS and (carrier.without or 0.0) > RESTS * uncertainty
         for carrier in carriers

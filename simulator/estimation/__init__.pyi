@@ -1,5 +1,5 @@
 # Public names of this package, each loaded from its module when it is first used.
-from .covariance import EXACT as EXACT, MICROMETRE as MICROMETRE
+from .covariance import RANK_TOLERANCE as RANK_TOLERANCE, MICROMETRE as MICROMETRE
 from .elimination import ALIKE as ALIKE, ROWS_AT_ONCE as ROWS_AT_ONCE
 from .functions import (
     BallPlaces as BallPlaces,

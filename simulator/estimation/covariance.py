@@ -105,7 +105,7 @@ def _by_substitution_transposed(root: Array, side: Array) -> Array:
 # Below this fraction of the largest singular value a direction is undetermined: rounding leaves
 # about 1e-14, and the weakest determined direction of a usable design is many orders of magnitude
 # above.
-EXACT = 1e-10
+RANK_TOLERANCE = 1e-10
 
 # The size of change that a singular value is quoted for.
 MICROMETRE = 1e-6
@@ -198,7 +198,7 @@ def spectrum(factor: Factor, drawn: Spectrum | None = None) -> Spectrum:
                 for rows in (judged.ball_shared, judged.kept_shared)
             ),
         )
-        deficiency = int((values <= EXACT * largest).sum())
+        deficiency = int((values <= RANK_TOLERANCE * largest).sum())
         rank = len(values) - deficiency
         gap = float("inf")
         if 0 < deficiency < len(values):
@@ -286,7 +286,7 @@ def ball_covariance(design: Design, factor: Factor, spectrum: Spectrum) -> BallC
     shared, null = spectrum.root, spectrum.null
     rank, nulls, k = shared.shape[1], null.shape[1], d * len(factor.kept)
     ball = np.zeros((n, d, rank + k))
-    covariances = np.zeros((n, d, d))
+    roots = np.zeros((n, d, d))
     ball_null = np.zeros((n, d, nulls))
     # The three rows of a ball are R y + S t = z + e, with the shared parameters t and noise e of
     # unit variance, which no other row has: y = R^-1 (z + e - S t). The covariance of the ball is
@@ -297,7 +297,7 @@ def ball_covariance(design: Design, factor: Factor, spectrum: Spectrum) -> BallC
     rows = carried.reshape(d * len(carried), carried.shape[2])
     ball[factor.eliminated, :, :rank] = (rows @ shared).reshape(len(carried), d, rank)
     ball_null[factor.eliminated] = (rows @ null).reshape(len(carried), d, nulls)
-    covariances[factor.eliminated] = solve_balls(
+    roots[factor.eliminated] = solve_balls(
         factor, np.broadcast_to(np.eye(d), factor.ball_root.shape)
     )
     if k:
@@ -310,4 +310,4 @@ def ball_covariance(design: Design, factor: Factor, spectrum: Spectrum) -> BallC
         ball[factor.kept, :, :rank] = solved[:, :rank].reshape(len(factor.kept), d, rank)
         ball_null[factor.kept] = solved[:, rank : rank + nulls].reshape(len(factor.kept), d, nulls)
         ball[factor.kept, :, rank:] = solved[:, rank + nulls :].reshape(len(factor.kept), d, k)
-    return BallCovariance(ball, covariances, ball_null)
+    return BallCovariance(ball, roots, ball_null)

@@ -1,4 +1,4 @@
-"""References of positions and calibrations to artefacts, probes and balls by name."""
+"""Artefacts get their balls, and with them what a file can refer to by name."""
 
 from __future__ import annotations
 

@@ -115,10 +115,10 @@ def read_distances(
     is_right &= check_keys(settings, steps, references)
     if not is_right:
         return None
-    lengths = _certified_distances(settings, indices, layout, nominal, steps, references)
-    if lengths is None:
+    certified = _certified_distances(settings, indices, layout, nominal, steps, references)
+    if certified is None:
         return None
-    values, in_file, covariance = lengths
+    values, in_file, covariance = certified
     names = [(layout.names[i], layout.names[j]) for i, j in indices]
     uncertainty = settings.standard_uncertainty
     of_item = None if uncertainty is None else uncertainty.at(nominal)
@@ -274,8 +274,8 @@ def _certified_distances(
         return None
     chosen = [by_pair[frozenset(pair)] for pair in wanted]
     return (
-        np.array([pair.value for pair in chosen]),
-        np.array([pair.uncertainty for pair in chosen]),
+        np.array([entry.value for entry in chosen]),
+        np.array([entry.uncertainty for entry in chosen]),
         table_entries.covariance,
     )
 

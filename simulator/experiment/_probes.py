@@ -81,8 +81,8 @@ def resolve_probes(sections: Sections, references: References) -> dict[str, Prob
     members = _star_members(sections, references)
     reference = _reference_probe(sections, references)
     probes = {}
-    for key, settings in sections.probes.items():
-        name, steps = str(key), ("probes", str(key))
+    for name, settings in sections.probes.items():
+        steps = ("probes", name)
         offset, uncertainty, angles = settings, None, None
         if isinstance(settings, ProbeSettings):
             offset = _offset(settings, sections.head, steps, references)

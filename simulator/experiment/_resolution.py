@@ -93,18 +93,18 @@ def resolve(
     off = [position for position in positions.values() if not position.enabled]
     enabled = {i: position for i, position in positions.items() if position.enabled}
     offered = tuple(choices or enabled.values())
-    named = dict(enumerate((*offered, *off)))
-    readers, reader_count = enabled, sections.position_count - len(off)
+    all_positions = dict(enumerate((*offered, *off)))
+    may_read, reader_count = enabled, sections.position_count - len(off)
     if planning:
-        readers = dict(enumerate(offered))
-        reader_count = len(readers) + (not is_complete)
+        may_read = dict(enumerate(offered))
+        reader_count = len(may_read) + (not is_complete)
     calibrations = {}
     for i, settings in sections.calibration.items():
         calibration = resolve_calibration(settings, ("calibration", i), references)
         if calibration is not None:
             calibrations[i] = calibration
             check_calibration_read(
-                calibration, ("calibration", i), readers, reader_count, references
+                calibration, ("calibration", i), may_read, reader_count, references
             )
     check_radii(calibrations, problems)
     pool = None
@@ -114,8 +114,8 @@ def resolve(
     if sections.priors:
         from ._priors import resolve_priors
 
-        priors = resolve_priors(sections, machine, named, probes, references)
-    influences = resolve_influences(sections, named, references)
+        priors = resolve_priors(sections, machine, all_positions, probes, references)
+    influences = resolve_influences(sections, all_positions, references)
     noise = resolve_noise(sections.noise, problems)
     evaluation = resolve_evaluation(sections, machine, probes, references)
     check_size(sections, machine, enabled, calibrations, probes, evaluation, references)

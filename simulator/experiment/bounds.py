@@ -233,15 +233,16 @@ def _outside(
     if not rows:
         return ""
     balls = np.concatenate([indices for indices, _, _ in rows])
+    names_of_rows = [name for indices, name, _ in rows for _ball in indices]
     by_how_much, axes, sides = excess(
-        np.concatenate([places[reading] - offset for reading, _, offset in rows]), volume
+        np.concatenate([places[indices] - offset for indices, _, offset in rows]), volume
     )
     outside = np.flatnonzero(by_how_much > SLIGHTLY * (volume.upper - volume.lower)[axes])
     if len(outside) == 0:
         return ""
     # The first of those furthest outside, whatever rounding makes of equal ones.
     worst = int(outside[np.argmax(by_how_much[outside] > by_how_much.max() - TOLERANCE)])
-    axis, probe = int(axes[worst]), [probe for indices, probe, _ in rows for _ in indices][worst]
+    axis, probe = int(axes[worst]), names_of_rows[worst]
     offset, place = float(probes[probe].offset[axis]), float(places[balls[worst], axis])
     others_text = f", and {number_of(len(outside) - 1, 'more reading')}" if len(outside) > 1 else ""
     less = (

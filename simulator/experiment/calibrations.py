@@ -112,7 +112,7 @@ def resolve_calibration(settings: Any, steps: Steps, references: References) -> 
         layout = next(iter(references.layouts.values()), None)
         if of_machine is None or layout is None:
             return None
-        text = _unnamed(of_machine.names(layout))
+        text = _fault_of_names(of_machine.names(layout))
         return of_machine if references.require(not text, steps, text) else None
     artefact = references.artefact(settings.artefact, steps)
     if artefact is None or artefact not in references.layouts:
@@ -141,7 +141,7 @@ def resolve_calibration(settings: Any, steps: Steps, references: References) -> 
     return calibration if references.require(not text, steps, text) else None
 
 
-def _unnamed(pairs: list[tuple[str, str]]) -> str:
+def _fault_of_names(pairs: list[tuple[str, str]]) -> str:
     """Return the fault in the names of an item's values, or an empty text."""
     names = [", ".join(pair) for pair in pairs]
     if not names:
@@ -152,7 +152,7 @@ def _unnamed(pairs: list[tuple[str, str]]) -> str:
 
 def _unsuitable(item: Calibration, layout: BallLayout) -> str:
     """Return the fault of values that nominal ball positions do not define, or an empty text."""
-    if text := _unnamed(item.names(layout)):
+    if text := _fault_of_names(item.names(layout)):
         return text
     names = [", ".join(name) for name in item.names(layout)]
     observed, extent = item.observed(0), float(np.ptp(layout.coordinates, axis=0).max())

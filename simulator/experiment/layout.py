@@ -330,7 +330,7 @@ def _held(
         places = balls.places[members]
         idle = _idle_turns(places)
         for k in positions:
-            held_flags[k] |= _pivots(_in_machine_axes(idle, rotations[k]))
+            held_flags[k] |= _parameters_to_hold(_in_machine_axes(idle, rotations[k]))
         chosen = np.isin(ball, members)
         # About the centre of the balls, as the idle turns are.
         fixed = _motion_of_coordinates(
@@ -342,7 +342,7 @@ def _held(
         motions = _in_machine_axes(np.concatenate([idle, free], axis=1), first)
         # What is held of idle turns counts among the pivots, so that in all no parameter too many
         # is held.
-        held_flags[positions[0]] |= _pivots(motions, held_flags[positions[0]])
+        held_flags[positions[0]] |= _parameters_to_hold(motions, held_flags[positions[0]])
     return held_flags
 
 
@@ -400,7 +400,7 @@ def _null_space(rows: Array) -> Array:
 # Pivoted elimination of rows: to hold a parameter removes the motions that would change it. The
 # parameter that they change most is taken first, and the remaining motions are made orthogonal to
 # it, so that those held determine all motions, and well.
-def _pivots(motions: Array, already: Flags | None = None) -> Flags:
+def _parameters_to_hold(motions: Array, already: Flags | None = None) -> Flags:
     """Parameters (rows of `motions`) to hold so that no motion remains, those `already` held first,
     then largest.
     """

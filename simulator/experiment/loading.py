@@ -55,15 +55,15 @@ def load(
         a ``tolerant`` reader: its machine, or the YAML, cannot be understood.
     """
     source = Path(path)
-    refused: list[Message] = []
+    substituted: list[Message] = []
     if text is not None:
         refuse_long_lines(text, source)
     written = read_text(source) if text is None else text
-    root, trees, base_problems = trees_of(written, source, refused)
+    root, trees, base_problems = trees_of(written, source, substituted)
     if not trees:
         tree = _without_variants(root)
         experiment, messages = build(tree, source, None, trust, planning, tolerant)
-        all_faults = in_order([*base_problems.messages, *messages], refused, source)
+        all_faults = in_order([*base_problems.messages, *messages], substituted, source)
         if experiment is None or (all_faults and not tolerant):
             raise ExperimentError(all_faults)
         return (replace(experiment, faults=tuple(all_faults) if tolerant else None),)
@@ -75,7 +75,7 @@ def load(
     for name, tree in trees.items():
         experiment, messages = build(tree, source, name, trust, planning, tolerant)
         if experiment is not None:
-            faults = tuple(in_order(messages, refused, source)) if tolerant else None
+            faults = tuple(in_order(messages, substituted, source)) if tolerant else None
             mark = mark_of(root, ("variants", name), of_key=True)
             experiment = replace(experiment, mark=mark, faults=faults)
             lost = unspanned(_without_variants(root), experiment)
@@ -101,21 +101,21 @@ def load(
         replace(message, text=message.text + in_variants(names, list(trees)))
         for message, names in variants_of.items()
     ]
-    all_faults = in_order(found, refused, source)
+    all_faults = in_order(found, substituted, source)
     if all_faults and not (tolerant and experiments):
         raise ExperimentError(all_faults)
     return tuple(experiments)
 
 
 def trees_of(
-    text: str, source: Path, refused: list[Message]
+    text: str, source: Path, substituted: list[Message]
 ) -> tuple[Node, dict[str, Node], Problems]:
     """Return the content of a file with this text, its variants by name, and the faults of these;
-    faults of the YAML go to ``refused``.
+    faults of the YAML go to ``substituted``.
 
     :raises ExperimentError: the YAML has no tree.
     """
-    root = parse_tree(text, str(source), refused)
+    root = parse_tree(text, str(source), substituted)
     problems = Problems(root)
     return root, variant_trees(root, problems), problems
 

@@ -172,10 +172,10 @@ def uncertainties_of(
         of_values = uncertainties_read
     matrix, where = covariance, settings.values
     if settings.covariance is not None:
-        named = _of_file(settings, names, is_pair, steps, references)
-        if named is None:
+        matrix_read = _of_file(settings, names, is_pair, steps, references)
+        if matrix_read is None:
             return None
-        is_correlation, values, rounding = named
+        is_correlation, values, rounding = matrix_read
         if not is_correlation:
             matrix = covariance = values, rounding
             where = settings.covariance
@@ -291,14 +291,14 @@ def _of_file(
     entry_of_name = np.full(len(names), -1)
     messages = []
     for i, name in enumerate(matrix.names):
-        position_in_names = index.get(" ".join(name.split()))
-        if position_in_names is None:
+        k = index.get(" ".join(name.split()))
+        if k is None:
             text = f'"{shorten(name)}" names no value of this item; {hint(name, index)}'
             messages.append(matrix.marks[i].message("", text))
-        elif entry_of_name[position_in_names] >= 0:
+        elif entry_of_name[k] >= 0:
             messages.append(matrix.marks[i].message("", f'"{shorten(name)}" stands there twice'))
         else:
-            entry_of_name[position_in_names] = i
+            entry_of_name[k] = i
     missing = [value_name(names[k], is_pair) for k in np.flatnonzero(entry_of_name < 0).tolist()]
     if missing and not messages:
         problems.add(place, f"no covariance of {listing(missing)}; add it")

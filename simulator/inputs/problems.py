@@ -71,20 +71,20 @@ class Problems:
 
 
 def in_order(
-    messages: Iterable[Message], made_up: Iterable[Message], source: Path
+    messages: Iterable[Message], substituted: Iterable[Message], source: Path
 ) -> list[Message]:
     """Return messages by line, those about the source before those about its tables.
 
-    `made_up` concern values that were substituted for refused ones: other messages at their
+    `substituted` concern values that were substituted for refused ones: other messages at their
     locations are dropped.
     """
-    substituted = {(error.file, error.line, error.column) for error in made_up}
+    places = {(error.file, error.line, error.column) for error in substituted}
     genuine = [
         message
         for message in messages
-        if (message.file, message.line, message.column) not in substituted
+        if (message.file, message.line, message.column) not in places
     ]
-    return sorted({*genuine, *made_up}, key=lambda error: (error.file != str(source), error))
+    return sorted({*genuine, *substituted}, key=lambda error: (error.file != str(source), error))
 
 
 def written_keys(root: Node, *steps: Step) -> tuple[str, ...]:

@@ -322,8 +322,8 @@ def _number_and_factor(value: object, kind: str) -> tuple[str, Fraction]:
                 f'"{text}" is {_article(other)}; {_article(kind)} is expected, for example'
                 f' "{about.example}"'
             )
-    if factor := re.fullmatch(r"(.+?)\s*\(\s*k\s*=\s*([1-9][0-9]*\.?[0-9]*)\s*\)", plain):
-        standard = f"{float(number) / float(factor[2]):.9g} {factor[1]}"
+    if expanded := re.fullmatch(r"(.+?)\s*\(\s*k\s*=\s*([1-9][0-9]*\.?[0-9]*)\s*\)", plain):
+        standard = f"{float(number) / float(expanded[2]):.9g} {expanded[1]}"
         raise QuantityError(
             f'"{text}" is an expanded uncertainty; write the standard one, "{standard}"'
         )

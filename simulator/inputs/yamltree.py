@@ -115,13 +115,13 @@ class Mapping:
 Node = Scalar | Sequence | Mapping
 
 
-def read_tree(path: Path, minor: list[Message] | None = None) -> Node:
+def read_tree(path: Path, substituted: list[Message] | None = None) -> Node:
     """Read a YAML file; see ``parse_tree``.
 
     :raises ExperimentError: the file cannot be read, is not YAML, is empty, holds several
         documents, repeats a key or uses merge keys, tags or recursive aliases.
     """
-    return parse_tree(read_text(path), str(path), minor)
+    return parse_tree(read_text(path), str(path), substituted)
 
 
 @dataclass(frozen=True)
@@ -193,10 +193,10 @@ def utf8_text(content: bytes, file: str) -> str:
     return text
 
 
-def parse_tree(text: str, file: str, minor: list[Message] | None = None) -> Node:
+def parse_tree(text: str, file: str, substituted: list[Message] | None = None) -> Node:
     """Read YAML text; ``file`` is named in messages.
 
-    ``minor``, if given, collects errors that leave a usable tree, such as a repeated key.
+    ``substituted``, if given, collects errors that leave a usable tree, such as a repeated key.
 
     :raises ExperimentError: as ``read_tree``.
 
@@ -221,10 +221,10 @@ def parse_tree(text: str, file: str, minor: list[Message] | None = None) -> Node
             return parse_tree(text[: end.index], file)
         builder.messages.append(_syntax_message(error, text, file))
         builder.root = None
-    if builder.messages and (minor is None or builder.root is None):
+    if builder.messages and (substituted is None or builder.root is None):
         raise ExperimentError(sorted(builder.messages))
-    if minor is not None:
-        minor += builder.messages
+    if substituted is not None:
+        substituted += builder.messages
     if builder.root is None:
         raise refused(
             file,

@@ -130,8 +130,8 @@ def read_readings(
     x = _where_not_read(rows, x, design, readings)
     if settings.coordinates != "part":
         _refuse_far_outside(rows, x if empty else coordinates, design)
-    weights = uncertainty if has_uncertainty else _planned_uncertainty(design, readings)
-    readings = replace(readings, uncertainty=weights, beside=beside)
+    uncertainties = uncertainty if has_uncertainty else _planned_uncertainty(design, readings)
+    readings = replace(readings, uncertainty=uncertainties, beside=beside)
     readings = in_sequence(readings, design.influences)
     marks = tuple(row.mark for row in rows)
     swapped = ()

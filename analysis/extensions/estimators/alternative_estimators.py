@@ -43,7 +43,13 @@ from ballplate.simulator.design import (
     reading_uncertainties,
     shared_layout,
 )
-from ballplate.simulator.estimation import EXACT, MICROMETRE, GaussNewtonSettings, Iteration, Status
+from ballplate.simulator.estimation import (
+    RANK_TOLERANCE,
+    MICROMETRE,
+    GaussNewtonSettings,
+    Iteration,
+    Status,
+)
 from ballplate.simulator.machines import Array, Integers
 
 # Share of a distance as read below which an estimate is no machine's.
@@ -151,7 +157,7 @@ def alternative_estimate(
             np.linalg.qr(np.column_stack([derivative * scale, residual]), mode="r")
         )
         u, values, vh = svd(triangle[: len(a), :-1])
-        rank = int((values > EXACT * values.max(initial=0.0)).sum())
+        rank = int((values > RANK_TOLERANCE * values.max(initial=0.0)).sum())
         null = scale[:, None] * vh[rank:].T
         if status == "converged" or len(record) > settings.iterations:
             break

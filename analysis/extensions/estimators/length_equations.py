@@ -30,7 +30,7 @@ from typing import Literal
 import numpy as np
 from ballplate.simulator.computing import single_threaded, svd
 from ballplate.simulator.design import Design, Lengths, equation_root, length_whitening
-from ballplate.simulator.estimation import EXACT, MICROMETRE, initial_state
+from ballplate.simulator.estimation import RANK_TOLERANCE, MICROMETRE, initial_state
 from ballplate.simulator.inputs import Flags
 from ballplate.simulator.machines import Array, parameters_of_metric
 
@@ -282,7 +282,7 @@ def _open_directions(equations: _Equations, unknowns: Array) -> Array:
     exact = equations.direction * length[:, None]
     rows = equations.reduced(_derivative(equations, unknowns, exact, exact, length)) * MICROMETRE
     _, values, vh = svd(np.linalg.qr(rows, mode="r") if len(rows) > rows.shape[1] else rows)
-    return vh[int((values > EXACT * values.max(initial=0.0)).sum()) :].T
+    return vh[int((values > RANK_TOLERANCE * values.max(initial=0.0)).sum()) :].T
 
 
 def _solved(
@@ -301,7 +301,7 @@ def _solved(
         if held_directions is not None:
             used = used - (used @ held_directions) @ held_directions.T
         u, values, vh = svd(used, full_matrices=False)
-        rank = int((values > EXACT * values.max(initial=0.0)).sum())
+        rank = int((values > RANK_TOLERANCE * values.max(initial=0.0)).sum())
         root = np.zeros((len(unknowns), rank))
         root[columns] = MICROMETRE * vh[:rank].T / values[:rank]
         step = -root @ (u[:, :rank].T @ residual)

@@ -31,7 +31,13 @@ from ballplate.simulator.design import (
     reading_weights,
     rotation_sensitivity,
 )
-from ballplate.simulator.estimation import ALIKE, EXACT, Collected, Triangle, triangle as triangular
+from ballplate.simulator.estimation import (
+    ALIKE,
+    RANK_TOLERANCE,
+    Collected,
+    Triangle,
+    triangle as triangular,
+)
 from ballplate.simulator.experiment import Candidate, Experiment, Position
 from ballplate.simulator.inputs import refused
 from ballplate.simulator.machines import Array
@@ -481,13 +487,13 @@ def _basis(
         triangle = np.asarray(np.linalg.qr(np.concatenate([triangle, *batch]), mode="r"))
     triangle = np.concatenate([triangle, np.zeros((y + shared, y + shared))])[: y + shared]
     left_vectors, of_balls, by_balls = svd(triangle[:y, :y])
-    is_read = of_balls > EXACT * of_balls.max(initial=0.0)
+    is_read = of_balls > RANK_TOLERANCE * of_balls.max(initial=0.0)
     # What balls leave of the rows above belongs to shared columns.
     below = np.concatenate([left_vectors[:, ~is_read].T @ triangle[:y, y:], triangle[y:, y:]])
     _, values, right = svd(below, full_matrices=True)
     values = np.concatenate([values, np.zeros(shared - len(values))])
     # Where balls take up all of them, the largest that is left is rounding, too.
-    is_known = values > EXACT * np.linalg.norm(triangle[:, y:])
+    is_known = values > RANK_TOLERANCE * np.linalg.norm(triangle[:, y:])
     ball_open, open_ = by_balls[~is_read].T, right[~is_known].T
     if similar is None:
         ball_root = by_balls[is_read].T / of_balls[is_read]

@@ -157,13 +157,13 @@ def covariance_root(covariance: Array, rounding: Array | float = 0.0) -> Covaria
     # A value without uncertainty has no correlations. Divided by what it counts as, its row would
     # have some that are made of rounding.
     exact = size <= EXACT
-    variances = np.where(exact, EXACT, size)
+    own = np.where(exact, EXACT, size)
     inner, doubt = ~exact, ""
-    vectors, deviations = np.eye(len(variances)), np.ones(len(variances))
+    vectors, deviations = np.eye(len(own)), np.ones(len(own))
     if inner.any():
         # Eigenvalues of correlations are between 0 and m whatever the units and sizes of values.
         # One threshold then serves all of them.
-        scale = np.outer(variances[inner], variances[inner])
+        scale = np.outer(own[inner], own[inner])
         correlation = covariance[np.ix_(inner, inner)] / scale
         values, eigenvectors = eigh((correlation + correlation.T) / 2.0)
         share = np.broadcast_to(rounding, covariance.shape)[np.ix_(inner, inner)] / scale
@@ -186,4 +186,4 @@ def covariance_root(covariance: Array, rounding: Array | float = 0.0) -> Covaria
             )
         vectors[np.ix_(inner, inner)] = eigenvectors
         deviations[inner] = np.sqrt(np.maximum(values, floor))
-    return CovarianceRoot(variances, vectors, deviations, doubt)
+    return CovarianceRoot(own, vectors, deviations, doubt)
