@@ -359,6 +359,8 @@ def _tied_rows(gathered: _Gathered, place_of: Integers, columns: int, s: int) ->
             index, d = np.arange(len(by_ball)), by_ball.shape[2]
             for ball, slope in zip(balls[some].T, by_ball.swapaxes(0, 1), strict=True):
                 for axis in range(d):
+                    # Added, not assigned: blocks of fewer balls repeat their first one, with a
+                    # slope of zero.
                     rows[index, d * place_of[ball] + axis] += slope[:, axis]
             if of_all.by_shared is not None:
                 rows[:, columns:-1] = of_all.by_shared[some]

@@ -142,6 +142,7 @@ def estimate(design: Design, x: Array, settings: GaussNewtonSettings | None = No
     if not drawn.deficiency or len(design.of(Lengths)):
         return solution_held
     followed = iterate(design, x, start, settings)
+    # Any step on the way counts, also if the iteration has come back.
     went_far = max(iteration.step for iteration in followed.iterations) > NEIGHBOURHOOD
     if followed.status != "converged" or went_far:
         return solution_held

@@ -83,6 +83,7 @@ def _known(
             )
     reported = model.reported()
     for name, k in reported.known_names().items():
+        # A quoted coefficient may have the name of a parameter, which is meant then.
         known_quantities.setdefault(
             name, ((reported.names[k], None, None, -1, reported.matrix[k], reported.units[k], 0.0),)
         )

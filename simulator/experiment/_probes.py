@@ -93,6 +93,8 @@ def resolve_probes(sections: Sections, references: References) -> dict[str, Prob
                 text = "its star states the uncertainty of this probe; remove it"
                 problems.add((*steps, key), text, True)
         if name in members:
+            # Offsets of a star's tips are free one by one. What is known of them is the shape of
+            # the star.
             uncertainty = np.full(dimension or 0, np.inf)
         if offset is not None and references.has_dimension(offset, steps):
             offset_uncertainty = None if name == reference else uncertainty
@@ -223,6 +225,8 @@ def _reference_probe(sections: Sections, references: References) -> str:
             ("probes", name, "reference"),
             f'"{named[0]}" is the reference already; remove one of the two',
         )
+    # A shift of all offsets cannot be distinguished from a shift of all poses, so that one offset
+    # has to be held.
     in_place = _in_place(sections, references)
     if named:
         text = (

@@ -161,6 +161,8 @@ def _unsuitable(item: Calibration, layout: BallLayout) -> str:
     # Each ball is moved otherwise, by what rounding may do.
     way = np.sin(np.arange(1.0, layout.coordinates.size + 1.0)).reshape(layout.coordinates.shape)
     beside = _values_at(observed, layout.coordinates + 1e-12 * extent * way)[1]
+    # A slope that changes by half of itself with displacements of the size of rounding is that of a
+    # function without a derivative there.
     size, change = (np.abs(slope).max(axis=(1, 2)) for slope in (slopes, beside - slopes))
     # A change that is no number is no small one.
     is_smooth = np.isfinite(values) & (change <= 0.5 * size)

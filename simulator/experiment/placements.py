@@ -96,6 +96,8 @@ def resolve_positions(
 
 
 def _draft(settings: PositionSettings, steps: Steps, references: References) -> _Draft | None:
+    # Everything is looked at before anything that is wrong ends it, so that all faults of a
+    # position are reported at once.
     artefact = references.artefact(settings.artefact, steps)
     layout = references.layouts.get(artefact) if artefact is not None else None
     readings = _readings(settings, steps, layout, references)

@@ -52,6 +52,8 @@ class References:
 
     def count_readings(self, count: int, steps: Steps) -> bool:
         """Count further readings; return false, after one message, if there are too many."""
+        # The message comes with the position that exceeds the limit. Further ones are refused
+        # without it.
         before = self.tally["readings"]
         self.tally["readings"] += count
         if before <= MOST_READINGS < self.tally["readings"]:

@@ -69,6 +69,8 @@ def _least(experiment: Experiment, rooms: Sequence[Array]) -> Array:
     balls = [
         ball_coordinates(at.pose, experiment.layouts[at.artefact]) for at in _plates(experiment)
     ]
+    # A plate across an axis is at one place of it, chosen for reasons of its own, and says nothing
+    # about what plates span along it.
     lie = np.array([np.ptp(rows, axis=0) > TOLERANCE for rows in balls], bool).reshape(-1, 1, d)
     where = lie | ~lie.any(axis=0)
     return np.min(np.reshape(rooms, (-1, 2, d)), axis=0, where=where, initial=np.inf)

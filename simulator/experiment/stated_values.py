@@ -286,6 +286,7 @@ def _of_file(
         return None
     index = {}
     for k, (first, second) in enumerate(names):
+        # Two balls may be named in either order.
         index[f"{first} {second}"] = k
         index[f"{second} {first}"] = k
     entry_of_name = np.full(len(names), -1)

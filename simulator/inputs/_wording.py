@@ -305,6 +305,9 @@ def _schemas_at(
     ]
 
 
+# The JSON schema, and not the classes, tells what would have been allowed: it has the kinds of
+# extensions as well. Of a union of kinds only the one that the file names is followed, unless all
+# are asked for, so that advice is not about another.
 def _expand(part: Schema, schema: Schema, node: Node | None) -> Iterator[Schema]:
     if "$ref" in part:
         yield from _expand(schema["$defs"][part["$ref"].removeprefix("#/$defs/")], schema, node)

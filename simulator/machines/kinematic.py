@@ -283,6 +283,10 @@ def kinematic_model_of(
     With `squareness` all six straightness functions do, and three squareness errors are
     parameters: the 21-parameter form, equivalent if the families contain t.
     """
+    # Conditions on the functions fix the frame (NPL section 2.4.1). They remove exactly what no
+    # reading distinguishes: the displacements at 0, a turn of the frame in three of the six linear
+    # terms, and constant rotations, which turn the probe, and the axes mounted on an axis as linear
+    # terms of their straightnesses do.
     families = dict(single_families)
     functions = []
     for is_rotation, family in ((False, position), (True, rotation)):

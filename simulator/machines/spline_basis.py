@@ -135,6 +135,7 @@ class Spline:
         jumps = np.stack(
             [splines(1.0, nu=k) - splines(0.0, nu=k) for k in range(1, self.order - 1)]
         )
+        # Derivatives of higher order are larger by far, and every condition counts alike.
         jumps /= np.abs(jumps).max(axis=1, keepdims=True)
         # Orthonormal combinations that have no jumps.
         null = np.linalg.qr(jumps.T, mode="complete")[0][:, len(jumps) :]

@@ -26,6 +26,9 @@ def true_artefacts(design: Design, generator: np.random.Generator) -> Array:
     certified = [kind for kind in design.observations if kind.balls.shape[1]]
     rows = [kind.rows(design, nominal_state(design), None) for kind in certified]
     d = design.dimension
+    # The certified values are kept, and the artefact differs from them by drawn errors: its values
+    # are the certified less the nominal ones, and an error. Least squares of least length then give
+    # the displacements from the nominal artefact, so that what no certificate states stays nominal.
     sought = [
         kind.whitened(kind.errors(generator, 1)[0]) - block.residual
         for kind, block in zip(certified, rows, strict=True)
@@ -96,6 +99,8 @@ def _moved_by_lengths(balls: Array, pairs: Integers, wanted: Array, uncertainty:
     ends, index = np.unique(pairs, return_inverse=True)
     index = index.reshape(pairs.shape)
     moved = np.zeros_like(balls)
+    # Lengths are non-linear in displacements. The second pass leaves an error of second order of a
+    # small step.
     for _ in range(2):
         between = balls[pairs[0]] + moved[pairs[0]] - balls[pairs[1]] - moved[pairs[1]]
         length = np.sqrt((between**2).sum(axis=1))

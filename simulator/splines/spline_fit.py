@@ -148,6 +148,8 @@ def fit(
     _refuse_undetermined(space, x, design @ null, null)
     q, r = np.linalg.qr(design @ null)
     free = solve_triangular(r, q.T @ (y - design @ particular))
+    # The inverse triangle is a root of the covariance of the free part, of which the constraints
+    # make that of all coefficients.
     root = null @ solve_triangular(r, np.eye(len(r)))
     return SplineFit(space, particular + null @ free, root, x, y)
 

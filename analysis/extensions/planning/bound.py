@@ -105,6 +105,9 @@ def bound(problem: SelectionProblem) -> Bound | None:
         tangent = _tangent(problem, mixture.weights, powers[0])
         if tangent is None:
             break
+        # A concave function is below its tangent everywhere, and limits are linear in the weights.
+        # So the largest value of the tangent within the limits, at a vertex, bounds every
+        # selection, for tangents at any weights; better weights only make it sharper.
         vertex = _largest(limits, tangent.slope, problem.constraints.count)
         if vertex is None:
             break
@@ -149,6 +152,8 @@ def _first(problem: SelectionProblem) -> _Mixture | None:
     selection = fill(problem, problem.constraints.must, Losses(problem))
     vertices = [np.isin(np.arange(n), list(selection)).astype(float)]
     for _ in range(MOST_STARTS):
+        # Random slopes lead to different vertices within the limits. A mixture of enough of them
+        # has some of most candidates, and so determines what the pool does.
         point = _largest(limits, generator.random(n), n)
         if point is None:
             return None
@@ -224,6 +229,7 @@ def _largest(limits: Limits, slope: Array, count: int) -> Array | None:
 
     matrix, most, low, high = limits
     cost = np.zeros(matrix.shape[1])
+    # Rounded, so that of vertices that are equal by symmetry every computer takes the same.
     cost[:count] = -comparable(slope / np.abs(slope).max(), COMPARED)
     solution = linprog(
         cost, A_ub=matrix, b_ub=most, bounds=np.stack([low, high], axis=1), method="highs"
@@ -249,6 +255,7 @@ def _whole(limits: Limits, tangent: _Tangent) -> float:
         constraints=LinearConstraint(matrix, -np.inf, most),
         options={"node_limit": MOST_NODES},
     )
+    # The solver's own bound holds also if it has not finished.
     if solution.mip_dual_bound is None or not np.isfinite(solution.mip_dual_bound):
         return 0.0
     return float((tangent.constant - solution.mip_dual_bound * scale) ** -0.5)

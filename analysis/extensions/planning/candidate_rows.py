@@ -195,6 +195,8 @@ def _with_influences(
     """Add the position's own influence quantities, which are eliminated with its pose, and their
     priors.
     """
+    # A parameter of one position alone is like its pose: no other choice tells of it, and it is
+    # projected out with the pose, after its prior.
     influences, uncertainty = drawn.influences_of(position)
     q, count = rows.by_pose.shape[1], len(influences)
     by_own = by_influence[:, :, influences].reshape(len(rows), count)

@@ -142,6 +142,8 @@ class Criterion:
         if self.name == "D":
             half = (left_vectors / sizes).T @ self.scaled
             return value, value, value / (2 * n) * half.T @ half
+        # A weighted mean of variances with any fixed weights is at most the largest of them, and so
+        # bounds it from below for every selection. Powers put the weights on the largest ones here.
         relative = sizes / sizes[0]
         weights = relative**power / (relative**power).sum()
         value = float(np.sqrt(weights @ sizes**2))
@@ -167,6 +169,8 @@ def _largest_tangent(functions: Several, root: Array, power: float) -> tuple[flo
 
     def weigh(some: Array) -> Array:
         relative = some / size
+        # Weights that a mean of this power has as its derivative: with them fixed, the weighted
+        # mean is a bound for the largest value.
         weights = relative ** (power - 1)
         return np.stack([_halved(weights, some), weights, weights * some, relative**power])
 
@@ -309,6 +313,8 @@ class Pairs:
     def uncertainties(self, root: Array) -> Iterator[Array]:
         n, d = self.places.shape
         spread = (self.displacement.reshape(n * d, -1) @ root).reshape(n, d, -1)
+        # As in `ballplate.uncertainty`, the variance of a distance is that of both ends less twice
+        # their covariance, by components, so that a block is a few products of matrices.
         products = [[(spread[:, i] * spread[:, j]).sum(axis=1) for j in range(d)] for i in range(d)]
         for block in self._blocks():
             first, second = spread[block.first], spread[block.second]

@@ -183,6 +183,7 @@ class Frames:
         if not self.fixed:
             return np.zeros((self.rows.shape[1],) * 2)
         rows = np.concatenate([self.base, *(self.fixed[k] for k in members if k in self.fixed)])
+        # A row of zeros, so that there is a decomposition without any member as well.
         _, values, directions = svd(np.concatenate([rows, np.zeros((1, rows.shape[1]))]))
         rank = int((values > 1e-9 * values.max(initial=0.0)).sum())
         directions_left = directions[rank:] @ self.rows
@@ -226,6 +227,11 @@ def pool_information(
     # as it makes a difference (`items`), in the information; and in between (`blocks` below), in
     # the basis, in which both are computed.
     similar_always, similar_items, are_similar = rows_always, items, True
+    # Similar weights show which directions balls and machine have in common with the pool. The
+    # heaviest would hide the lightest there, as in an elimination. In the information an exact
+    # value has to be about exact, but not so much that the sum with a position loses that position.
+    # The basis makes the whole pool the identity, beside which a selection without such a value
+    # must not vanish, and so it is taken there as only mildly heavier.
     weight = _position_weight(drawn)
     if any(_differs(rows, weight) for rows in [*rows_always, *chain(*items.values())]):
         are_similar = False
@@ -251,6 +257,8 @@ def pool_information(
         raise refused(experiment.source, text, "pool")
 
     base = np.concatenate([_in_amounts(rows, balls) for rows in rows_always])
+    # A position brings its own pose, and is projected out of its rows as in B' (1 - Q Q') B with an
+    # orthonormal basis Q of the pose's columns: what is left is independent of the other choices.
     of_positions = position_rows(drawn)
     pool_rows = []
     pose_ranks = []
@@ -284,6 +292,8 @@ def pool_information(
     for k, reduced in enumerate(pool_rows):
         transformed = in_basis(reduced)
         matrices[k] = transformed.T @ transformed
+    # Both share a pose, which has been projected out of each. The difference is what further
+    # readings in the same pose add.
     for whole, part in (completed or {}).items():
         matrices[whole] -= matrices[part]
     transformed = in_basis(base)
@@ -410,6 +420,9 @@ def _combinations(drawn: PoolDesign, certificates: list[CandidateRows], all_ball
         kinds.setdefault(kind.round(9).tobytes(), kind)
         if len(kinds) > MOST_KINDS:
             span.add(all_coordinates)
+    # The span has to be closed: the information of a position on a ball maps a combination of
+    # co-ordinates into another one. Combinations outside of a closed span interact with nothing
+    # that a criterion about the machine needs, and are omitted.
     grown = -1
     while grown != span.rank and span.rank < most:
         grown = span.rank
@@ -467,6 +480,7 @@ class _Span:
             self.vectors = np.concatenate([self.vectors, np.linalg.qr(new_vectors)[0]], axis=1)
 
     def _new(self, columns: Array) -> Array:
+        # Twice, since a projection leaves rounding in proportion to what it removes.
         for basis in (self._without, self.vectors, self._without, self.vectors):
             columns = columns - basis @ (basis.T @ columns)
         return columns
@@ -486,6 +500,9 @@ def _basis(
     for batch in _batches(blocks if similar is None else similar, 4 * (y + shared)):
         triangle = np.asarray(np.linalg.qr(np.concatenate([triangle, *batch]), mode="r"))
     triangle = np.concatenate([triangle, np.zeros((y + shared, y + shared))])[: y + shared]
+    # The triangle of all rows has the balls first. A combination of balls with a singular value
+    # that counts as zero is not read; what the rows say of shared columns beside it joins the rows
+    # below.
     left_vectors, of_balls, by_balls = svd(triangle[:y, :y])
     is_read = of_balls > RANK_TOLERANCE * of_balls.max(initial=0.0)
     # What balls leave of the rows above belongs to shared columns.
@@ -504,6 +521,8 @@ def _basis(
             ),
             open_,
         )
+    # With weights that differ much, the same root is formed by the elimination that keeps the
+    # accuracy of every row, in the directions that similar weights have shown.
     collected = Collected(int(is_read.sum()), shared)
     for rows in blocks:
         collected.add(np.concatenate([rows[:, :y] @ by_balls[is_read].T, rows[:, y:]], axis=1))

@@ -170,6 +170,8 @@ class Losses:
             # By the same root as the value, so that no selection counts here that has none.
             root = _ridged_root(information) if self.by_pivots else full_root(information)
             if root is None:
+                # Deficient selections compare, too, so that a search can begin with none: each
+                # lacking set counts more than any number of undetermined directions.
                 loss = lacking + _in_place(information)
             else:
                 loss = lacking or self._problem.value(root)
@@ -223,6 +225,8 @@ def _sieve(
     """
     whole, matrices = np.eye(len(information)), problem.information.matrices
     # All candidates together have the identity, up to what the base has.
+    # A candidate cannot be judged beside a selection that is deficient: a little of all others
+    # takes the place of what is to come.
     mean = (whole - problem.information.base) / len(matrices)
     root = _inverse(np.asarray(np.linalg.cholesky(_ridged(information + mean)), float)).T
     counted, (_, _, half) = problem.counted, problem.tangent(root)
@@ -261,6 +265,8 @@ def best_addition(
     if not len(added):
         return None
     seconds = np.maximum(problem.constraints.seconds, 1.0)
+    # A calibration of co-ordinates changes what is held of frames, which tangents do not show. With
+    # one on offer all are evaluated in full.
     framed = np.isin(added, list(problem.information.frames.fixed))
     if len(added) > SMALL_POOL and not framed.any():
         added, tangents = losses.sieved(members, added)
@@ -282,6 +288,8 @@ def fill(
     improvement first, or largest improvement per second first.
     """
     timed = thorough and problem.constraints.budget.seconds is not None
+    # Neither is always better: the largest improvement first may use up the time, the largest per
+    # second may leave a gap that no candidate fits.
     ways = (False, True) if timed else (False,)
     return min(
         (_filled(problem, frozenset(chosen), losses, per_second) for per_second in ways),

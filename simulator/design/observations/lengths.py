@@ -63,6 +63,7 @@ class Lengths(LengthArrays, Observations):
         return self.uncertainty * drawn[:, self.certificate]
 
     def weights(self, design: Design, state: State) -> Array:
+        # Lengths that scatter have about the weight of a reading besides.
         weights_known = 1.0 / self.uncertainty[self.uncertainty > 0.0]
         return (
             np.append(weights_known, 1.0 / design.machine.repeatability)
