@@ -227,11 +227,9 @@ def pool_information(
     # as it makes a difference (`items`), in the information; and in between (`blocks` below), in
     # the basis, in which both are computed.
     similar_always, similar_items, are_similar = rows_always, items, True
-    # Similar weights show which directions balls and machine have in common with the pool. The
-    # heaviest would hide the lightest there, as in an elimination. In the information an exact
-    # value has to be about exact, but not so much that the sum with a position loses that position.
-    # The basis makes the whole pool the identity, beside which a selection without such a value
-    # must not vanish, and so it is taken there as only mildly heavier.
+    # Rounding of the heaviest rows would hide what the lightest determine, as in an elimination.
+    # The basis makes the whole pool the identity, beside which a selection without an exact value
+    # must not vanish: so that is only mildly heavier there.
     weight = _position_weight(drawn)
     if any(_differs(rows, weight) for rows in [*rows_always, *chain(*items.values())]):
         are_similar = False
