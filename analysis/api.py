@@ -136,8 +136,7 @@ def run(
     from dataclasses import replace
 
     from ballplate.montecarlo.experiments import MOST_TRIALS
-
-    from .results.checked_files import predict
+    from ballplate.results.prediction import predict
 
     ensure_whole(2, MOST_TRIALS, trials=trials)
     ensure_whole(0, seed=seed)

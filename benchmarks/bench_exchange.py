@@ -14,7 +14,7 @@ from ballplate.extensions.planning.constraints import Budget, constraints
 from ballplate.extensions.planning.criteria import criterion
 from ballplate.extensions.planning.information import Information, pool_information
 from ballplate.extensions.planning.search import Losses, SelectionProblem, best_addition, full_root
-from ballplate.results.checked_files import predict
+from ballplate.results.prediction import predict
 from ballplate.simulator.computing.processes import single_threaded
 from ballplate.simulator.experiment.construction import with_chosen
 from ballplate.simulator.experiment.loading import load

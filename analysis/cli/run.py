@@ -63,7 +63,7 @@ def _trial_count(text: str) -> int:
 
 def run(options: Namespace) -> int:
     """Plan all experiments of the files; 1 if the rank of one is not as expected."""
-    from ballplate.results.checked_files import predict
+    from ballplate.results.prediction import predict
 
     from .common import experiments, print_json, print_lines
 

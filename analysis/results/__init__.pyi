@@ -11,14 +11,10 @@ from .adjustments import (
 from .checked_files import (
     CheckedDesign as CheckedDesign,
     CheckedFile as CheckedFile,
-    PlannedUncertainty as PlannedUncertainty,
     Wanted as Wanted,
     advised as advised,
-    check as check,
     check_files as check_files,
     checked_design as checked_design,
-    planned_uncertainty as planned_uncertainty,
-    predict as predict,
 )
 from .estimates import (
     ESTIMATE_COLUMNS as ESTIMATE_COLUMNS,
@@ -40,7 +36,13 @@ from .plates import (
     in_plate_axes as in_plate_axes,
     plate_axes as plate_axes,
 )
-from .prediction import Prediction as Prediction
+from .prediction import (
+    PlannedUncertainty as PlannedUncertainty,
+    Prediction as Prediction,
+    check as check,
+    planned_uncertainty as planned_uncertainty,
+    predict as predict,
+)
 from .qualifications import (
     Qualification as Qualification,
     given_words as given_words,

@@ -13,8 +13,7 @@ from ballplate.simulator.experiment.earlier_campaigns import LEAST_SIGMA
 from ballplate.simulator.inputs.extensions import service
 from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.readings.observed_readings import ObservedReadings
-from ballplate.uncertainty.pairs import TaskUncertainty
-from ballplate.uncertainty.summaries import Quantity, tasks_of
+from ballplate.uncertainty.summaries import Quantity, TaskUncertainty, tasks_of
 
 from .adjustments import Adjustment, few_degrees_of_freedom
 from .estimates import EstimatedFunctions, ParameterEstimate

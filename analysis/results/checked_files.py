@@ -9,13 +9,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from ballplate.rank.verdicts import verdict
-from ballplate.simulator.computing.processes import single_threaded
 from ballplate.simulator.computing.steps import Report, counted, unreported
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.changes import unknown_variants
-from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.extensions import service
@@ -23,68 +18,10 @@ from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.inputs.settings import number_of
 from ballplate.simulator.inputs.trust import OPENED, Trust
 from ballplate.simulator.inputs.yamltree import Mark
-from ballplate.uncertainty.pairs import TaskUncertainty
-from ballplate.uncertainty.summaries import Quantity, tasks_of, uncertainties
 
 from .extension_results import AskedResult
-from .prediction import Advice, Prediction, influence_uncertainties
+from .prediction import Advice, Prediction, check
 from .qualifications import given_words
-
-
-@dataclass(frozen=True)
-class PlannedUncertainty:
-    """Rank deficiency and quantities, with measuring tasks, for searches that judge many
-    designs.
-    """
-
-    deficiency: int
-    quantities: dict[str, Quantity]
-
-    @property
-    def tasks(self) -> tuple[TaskUncertainty, ...]:
-        return tasks_of(self.quantities)
-
-
-def check(experiment: Experiment, design: Design | None = None) -> Prediction:
-    """Judge the rank of an experiment's design, or of another, at zero machine error."""
-    return _predict(experiment, design or lay_out(experiment), False)
-
-
-def predict(experiment: Experiment) -> Prediction:
-    """Return rank verdict and U1 to U6 of an experiment's design at zero machine error."""
-    return _predict(experiment, lay_out(experiment), True)
-
-
-@single_threaded
-def planned_uncertainty(experiment: Experiment) -> PlannedUncertainty:
-    """Return the uncertainties of `predict` without explaining the rank, which takes longest."""
-    at = linearise(lay_out(experiment))
-    quantities = uncertainties(at, target=experiment.target_uncertainty)
-    return PlannedUncertainty(at.deficiency, quantities)
-
-
-@single_threaded
-def _predict(experiment: Experiment, design: Design, with_quantities: bool) -> Prediction:
-    at, target = linearise(design), experiment.target_uncertainty
-    judged = verdict(at, experiment.expected_rank_deficiency, target)
-    quantities = {}
-    if with_quantities:
-        quantities = uncertainties(at, target=target)
-        lengths = quantities.get("U6")
-    else:
-        # A check states U6 alone, and computes no other quantity.
-        lengths = uncertainties(at, target=target, symbols=("U6",)).get("U6")
-    return Prediction(
-        experiment.label,
-        experiment.title,
-        design,
-        judged,
-        quantities,
-        lengths,
-        influences=influence_uncertainties(at) if with_quantities else (),
-        experiment=experiment,
-    )
-
 
 WITH_MODULES = "leave --no-modules out if you trust the file"
 
@@ -185,11 +122,11 @@ def check_files(
             doubts = tuple(dict.fromkeys(doubt for variant in chosen for doubt in variant.doubts))
             notes = tuple(dict.fromkeys(note for variant in chosen for note in variant.notes))
             is_single = len(chosen) == 1
-            experiments = chosen if is_single else counted(chosen, "designs", len(chosen), within)
+            to_check = chosen if is_single else counted(chosen, "designs", len(chosen), within)
             of_search = within if is_single else unreported
             judged = tuple(
                 checked_design(experiment, pools.get(experiment.name), wanted, of_search)
-                for experiment in experiments
+                for experiment in to_check
             )
             yield CheckedFile(str(path), judged, (), doubts, notes)
         except ExperimentError as error:

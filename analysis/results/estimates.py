@@ -10,8 +10,11 @@ from typing import Any, Literal, get_args
 import numpy as np
 from ballplate.simulator.computing.processes import single_threaded
 from ballplate.simulator.design.objects import Volume
-from ballplate.simulator.estimation.functions import linear_functions
-from ballplate.simulator.estimation.gauss_newton import corrected_points, correction_rows
+from ballplate.simulator.estimation.functions import (
+    corrected_points,
+    correction_rows,
+    linear_functions,
+)
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.geometry.motions import (
     AXIS_NAMES,

@@ -18,11 +18,11 @@ from ballplate.simulator.readings.observed_readings import ObservedReadings
 from ballplate.uncertainty.summaries import uncertainties
 
 from .adjustments import Adjustment, adjusted
-from .checked_files import check
 from .estimates import estimated_functions, parameter_estimates
 from .extension_results import SeparateSigmas, diagnosed
 from .fits import Fit
 from .plates import plate_coordinates
+from .prediction import check
 from .residuals import largest_residuals
 
 
@@ -55,7 +55,7 @@ def fit(
             *names, observed, solution, judged, 1.0, False, 0, {}, (), (), experiment=experiment
         )
     at = linearised_fit(design, solution)
-    sigma, estimated, freedom = _sigma(at, campaigns, is_estimated)
+    sigma_used, estimated, freedom = _sigma(at, campaigns, is_estimated)
     diagnosis, untested = diagnosed(at, observed.x, estimated, observed.marks)
     judged = verdict(at, experiment.expected_rank_deficiency, experiment.target_uncertainty)
     functions = estimated_functions(at, monomials)
@@ -65,14 +65,14 @@ def fit(
         observed,
         solution,
         judged,
-        sigma,
+        sigma_used,
         estimated,
         freedom,
-        uncertainties(at, sigma, experiment.target_uncertainty),
-        parameter_estimates(functions, sigma),
+        uncertainties(at, sigma_used, experiment.target_uncertainty),
+        parameter_estimates(functions, sigma_used),
         largest_residuals(design, solution, observed.x),
-        plate_coordinates(experiment, at, sigma),
-        _adjustments(at, sigma, freedom if estimated else np.inf),
+        plate_coordinates(experiment, at, sigma_used),
+        _adjustments(at, sigma_used, freedom if estimated else np.inf),
         diagnosis,
         untested,
         functions,

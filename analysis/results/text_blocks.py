@@ -18,9 +18,8 @@ from ballplate.presentation.formatting import (
 from ballplate.rank.verdicts import GREAT, Verdict
 from ballplate.simulator.computing.numerics import printable
 from ballplate.simulator.inputs.settings import listing, number_of
-from ballplate.uncertainty.pairs import TaskUncertainty, is_determined
 from ballplate.uncertainty.scale import Scale
-from ballplate.uncertainty.summaries import Quantity
+from ballplate.uncertainty.summaries import Quantity, TaskUncertainty, is_determined
 
 if TYPE_CHECKING:
     from ballplate.simulator.estimation.gauss_newton import Iteration

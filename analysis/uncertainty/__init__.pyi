@@ -1,6 +1,5 @@
 # Public names of this package, each loaded from its module when it is first used.
 from .pairs import (
-    expansion as expansion,
     open_above as open_above,
     pair_tiles as pair_tiles,
     pairs_of as pairs_of,
@@ -24,4 +23,9 @@ from .scale import (
     stretches as stretches,
     with_offsets as with_offsets,
 )
-from .summaries import Quantity as Quantity, summarise as summarise, uncertainties as uncertainties
+from .summaries import (
+    Quantity as Quantity,
+    expansion as expansion,
+    summarise as summarise,
+    uncertainties as uncertainties,
+)

@@ -17,7 +17,7 @@ from ballplate.simulator.computing.processes import single_threaded
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.objects import Volume
 from ballplate.simulator.design.state import State
-from ballplate.simulator.estimation.gauss_newton import correction_rows
+from ballplate.simulator.estimation.functions import correction_rows
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment

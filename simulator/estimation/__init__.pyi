@@ -1,5 +1,5 @@
 # Public names of this package, each loaded from its module when it is first used.
-from .covariance import RANK_TOLERANCE as RANK_TOLERANCE, MICROMETRE as MICROMETRE
+from .covariance import MICROMETRE as MICROMETRE, RANK_TOLERANCE as RANK_TOLERANCE
 from .elimination import ALIKE as ALIKE, ROWS_AT_ONCE as ROWS_AT_ONCE
 from .functions import (
     BallPlaces as BallPlaces,
@@ -10,6 +10,8 @@ from .functions import (
     MeasuredPoints as MeasuredPoints,
     Parameters as Parameters,
     Places as Places,
+    corrected_points as corrected_points,
+    correction_rows as correction_rows,
     displacements as displacements,
     linear_functions as linear_functions,
     point_rows as point_rows,
@@ -20,8 +22,6 @@ from .gauss_newton import (
     Solution as Solution,
     Status as Status,
     as_drawn as as_drawn,
-    corrected_points as corrected_points,
-    correction_rows as correction_rows,
     estimate as estimate,
     iterate as iterate,
     linearised_fit as linearised_fit,

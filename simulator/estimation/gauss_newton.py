@@ -9,11 +9,10 @@ import numpy as np
 from ballplate.simulator.computing.processes import scipy_linalg, single_threaded
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.lengths import Lengths
-from ballplate.simulator.design.observations.readings import offset_sensitivity
 from ballplate.simulator.design.parameters import SharedLayout, shared_layout
 from ballplate.simulator.design.state import State
 from ballplate.simulator.geometry.motions import rotation_from_vector
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.machines.protocol import Array
 
 from .covariance import (
     Spectrum,
@@ -28,11 +27,9 @@ from .elimination import Factor, eliminate
 from .linearisation import Linearisation, linearise
 
 Status = Literal["converged", "not converged", "diverged"]
-
 # An estimate with a longer step than this (m, rad), along whatever directions, has left the
 # neighbourhood of the drawing.
 NEIGHBOURHOOD = 0.01
-
 # What readings seem to tell of directions that are open as drawn is noise, unless noise alone would
 # seem to tell as much less often than this.
 CHANCE_OF_NOISE = 0.001
@@ -243,35 +240,3 @@ def moved(state: State, layout: SharedLayout, shared: Array, balls: Array) -> St
         state.lengths + shared[layout.lengths],
         state.influences + shared[layout.influences],
     )
-
-
-def corrected_points(design: Design, state: State, points: Array, probes: Integers) -> Array:
-    """Corrected points x + e(x, a, p) (m, d) for scale readings `points` (m, d) with probes of
-    indices (m,), metres.
-    """
-    return points + design.model.error(points, state.a, state.probes[probes])
-
-
-def correction_rows(
-    design: Design, layout: SharedLayout, state: State, points: Array, probes: Integers
-) -> Array:
-    """Derivative (m, d, s) of the corrected points by the shared parameters, estimated probe
-    offsets included.
-
-    `points` (m, d) are scale readings with probes of indices `probes` (m,).
-    """
-    offsets = state.probes[probes]
-    jacobian = design.model.jacobian(points, state.a, offsets)
-    rows = np.zeros((*jacobian.shape[:2], len(layout)))
-    rows[:, :, layout.model] = jacobian
-    if not design.probes.free.any():
-        return rows
-    by_offset = offset_sensitivity(design.model, points, state.a, offsets)
-    for probe in np.unique(probes):
-        estimated = layout.offset_columns[probe] >= 0
-        members = np.flatnonzero(probes == probe)
-        columns = layout.offset_columns[probe][estimated]
-        rows[members[:, None, None], np.arange(rows.shape[1])[:, None], columns] = by_offset[
-            members
-        ][:, :, estimated]
-    return rows

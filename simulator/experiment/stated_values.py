@@ -292,14 +292,14 @@ def _of_file(
     entry_of_name = np.full(len(names), -1)
     messages = []
     for i, name in enumerate(matrix.names):
-        k = index.get(" ".join(name.split()))
-        if k is None:
+        value = index.get(" ".join(name.split()))
+        if value is None:
             text = f'"{shorten(name)}" names no value of this item; {hint(name, index)}'
             messages.append(matrix.marks[i].message("", text))
-        elif entry_of_name[k] >= 0:
+        elif entry_of_name[value] >= 0:
             messages.append(matrix.marks[i].message("", f'"{shorten(name)}" stands there twice'))
         else:
-            entry_of_name[k] = i
+            entry_of_name[value] = i
     missing = [value_name(names[k], is_pair) for k in np.flatnonzero(entry_of_name < 0).tolist()]
     if missing and not messages:
         problems.add(place, f"no covariance of {listing(missing)}; add it")

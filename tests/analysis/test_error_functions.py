@@ -6,7 +6,7 @@ import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.simulator.design.measurement import locations
-from ballplate.simulator.estimation.gauss_newton import corrected_points
+from ballplate.simulator.estimation.functions import corrected_points
 
 SQUARE = "designs/park/plate.yaml"
 

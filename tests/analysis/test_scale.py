@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.cli import main
-from ballplate.results.checked_files import check, predict
+from ballplate.results.prediction import check, predict
 from ballplate.simulator.design.measurement import nominal_state
 from ballplate.simulator.design.objects import Volume
 from ballplate.simulator.estimation.functions import Distances, MeasuredPoints, linear_functions

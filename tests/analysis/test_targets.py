@@ -15,7 +15,7 @@ from ballplate.cli import main
 from ballplate.extensions.maps.length_map import length_map
 from ballplate.presentation.formatting import percent
 from ballplate.rank.verdicts import Verdict, weak_limit
-from ballplate.results.checked_files import check, predict
+from ballplate.results.prediction import check, predict
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 

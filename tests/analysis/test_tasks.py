@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.results.checked_files import predict
+from ballplate.results.prediction import predict
 from ballplate.simulator.design.observations.distances import CalibratedDistances
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out

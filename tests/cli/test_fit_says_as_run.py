@@ -7,10 +7,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.results.checked_files import predict
 from ballplate.results.fits import Fit
 from ballplate.results.fitting import fit
-from ballplate.results.prediction import Prediction
+from ballplate.results.prediction import Prediction, predict
 from ballplate.simulator.design.state import State
 from ballplate.simulator.estimation.gauss_newton import linearised_fit
 from ballplate.simulator.experiment.loading import load

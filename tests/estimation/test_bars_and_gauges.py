@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 import yaml
 from ballplate.extensions.estimators.length_equations import LengthEstimator, length_estimate
-from ballplate.results.checked_files import predict
 from ballplate.results.fitting import fit
+from ballplate.results.prediction import predict
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.measurement import nominal_state
 from ballplate.simulator.design.observations.lengths import Lengths

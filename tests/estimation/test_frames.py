@@ -8,7 +8,7 @@ import ballplate as bp
 import numpy as np
 import pytest
 import yaml
-from ballplate.results.checked_files import predict
+from ballplate.results.prediction import predict
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.measurement import nominal_state
 from ballplate.simulator.design.observations.coordinates import CalibratedCoordinates

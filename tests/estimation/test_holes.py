@@ -13,8 +13,8 @@ import yaml
 from ballplate import compare
 from ballplate.extensions.diagnosis.redundancy import reliability
 from ballplate.extensions.laboratory.gross_errors import find_gross_errors
-from ballplate.results.checked_files import predict
 from ballplate.results.fitting import fit
+from ballplate.results.prediction import predict
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.measurement import nominal_state
 from ballplate.simulator.design.parameters import shared_layout

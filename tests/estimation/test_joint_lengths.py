@@ -19,7 +19,7 @@ from ballplate.extensions.estimators.alternative_estimators import (
 )
 from ballplate.extensions.estimators.length_equations import length_estimate
 from ballplate.montecarlo.experiments import trials
-from ballplate.results.checked_files import predict
+from ballplate.results.prediction import predict
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.measurement import nominal_state
 from ballplate.simulator.design.observations.lengths import Lengths, length_whitening

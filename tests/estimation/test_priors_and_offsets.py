@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from ballplate.results.checked_files import check
 from ballplate.results.fitting import fit
+from ballplate.results.prediction import check
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.measurement import nominal_state
 from ballplate.simulator.design.observations.priors import Priors

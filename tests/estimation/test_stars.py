@@ -18,7 +18,7 @@ from ballplate.extensions.certificates.certificate_files import (
 )
 from ballplate.montecarlo._reference import Truth, reference
 from ballplate.montecarlo._replicates import draw, estimate_batch
-from ballplate.results.checked_files import predict
+from ballplate.results.prediction import predict
 from ballplate.simulator.design.measurement import nominal_state
 from ballplate.simulator.design.observations.star import Star, Stars, observed_stars
 from ballplate.simulator.design.parameters import shared_layout

@@ -9,7 +9,7 @@ import sys
 import pytest
 
 PROGRAM = """
-from ballplate.results.checked_files import predict
+from ballplate.results.prediction import predict
 from ballplate.simulator.experiment.loading import load
 (experiment,) = load("designs/quickstart.yaml")
 found = predict(experiment)

@@ -25,7 +25,7 @@ from ballplate.montecarlo.figures import (
     MonteCarloOutcome,
     outcome,
 )
-from ballplate.results.checked_files import predict
+from ballplate.results.prediction import predict
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.measurement import nominal_state
 from ballplate.simulator.design.observations.distances import CalibratedDistances

@@ -14,8 +14,8 @@ from ballplate.extensions.estimators.length_equations import LengthEstimator, le
 from ballplate.montecarlo._reference import Truth, reference
 from ballplate.montecarlo._replicates import BATCH, estimate_batch
 from ballplate.montecarlo.experiments import true_experiment
-from ballplate.results.checked_files import predict
 from ballplate.results.fitting import fit
+from ballplate.results.prediction import predict
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.experiment.layout import lay_out

@@ -44,8 +44,8 @@ from ballplate.simulator.design import (
     shared_layout,
 )
 from ballplate.simulator.estimation import (
-    RANK_TOLERANCE,
     MICROMETRE,
+    RANK_TOLERANCE,
     GaussNewtonSettings,
     Iteration,
     Status,

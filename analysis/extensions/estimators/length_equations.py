@@ -30,7 +30,7 @@ from typing import Literal
 import numpy as np
 from ballplate.simulator.computing import single_threaded, svd
 from ballplate.simulator.design import Design, Lengths, equation_root, length_whitening
-from ballplate.simulator.estimation import RANK_TOLERANCE, MICROMETRE, initial_state
+from ballplate.simulator.estimation import MICROMETRE, RANK_TOLERANCE, initial_state
 from ballplate.simulator.inputs import Flags
 from ballplate.simulator.machines import Array, parameters_of_metric
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from ballplate.presentation.formatting import amount_of, number
-from ballplate.results.checked_files import check, predict
+from ballplate.results.prediction import check, predict
 from ballplate.simulator.experiment.layout import lay_out
 
 from tests.extensions.influences import wording

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from ballplate.results.checked_files import predict
+from ballplate.results.prediction import predict
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import written_in_python

@@ -18,7 +18,8 @@ from ballplate.cli import main
 from ballplate.extensions.certificates.certificate_files import certified_values, with_values
 from ballplate.extensions.judgement.budget import BudgetFigure, UncertaintyBudget
 from ballplate.extensions.judgement.source_sums import source_sums, sources_of
-from ballplate.simulator.estimation.gauss_newton import corrected_points, estimate
+from ballplate.simulator.estimation.functions import corrected_points
+from ballplate.simulator.estimation.gauss_newton import estimate
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment

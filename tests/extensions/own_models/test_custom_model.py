@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 from ballplate.extensions.own_models import custom
-from ballplate.results.checked_files import check
+from ballplate.results.prediction import check
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError

@@ -20,7 +20,7 @@ def test_an_error_of_the_program_stays_one(tmp_path: Path, monkeypatch: pytest.M
         raise RuntimeError("mistake")
 
     wrong.__code__ = wrong.__code__.replace(co_filename=lay_out.__code__.co_filename)
-    monkeypatch.setattr("ballplate.results.checked_files.lay_out", wrong)
+    monkeypatch.setattr("ballplate.results.prediction.lay_out", wrong)
     with pytest.raises(RuntimeError, match="mistake"):
         main(["run", "designs/quickstart.yaml"])
 

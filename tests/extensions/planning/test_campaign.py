@@ -19,7 +19,7 @@ from ballplate.extensions.planning.campaign_choice import Request, campaign
 from ballplate.extensions.planning.remaining_candidates import offer
 from ballplate.extensions.planning.search import SelectionProblem
 from ballplate.presentation import percent
-from ballplate.results.checked_files import predict
+from ballplate.results.prediction import predict
 from ballplate.simulator.computing.steps import InternalError
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment

@@ -14,8 +14,7 @@ from ballplate.extensions.planning.constraints import Budget, constraints
 from ballplate.extensions.planning.criteria import CriterionName, criterion, is_about_balls
 from ballplate.extensions.planning.information import pool_information
 from ballplate.extensions.planning.search import Losses, SelectionProblem, value
-from ballplate.results.checked_files import predict
-from ballplate.results.prediction import Prediction
+from ballplate.results.prediction import Prediction, predict
 from ballplate.simulator.estimation.functions import displacements
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.construction import with_chosen

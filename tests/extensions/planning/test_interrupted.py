@@ -17,7 +17,7 @@ from ballplate.extensions.planning.constraints import Budget
 from ballplate.extensions.planning.remaining_candidates import offer
 from ballplate.extensions.planning.schedule import run_sheet
 from ballplate.extensions.planning.selection import Campaign
-from ballplate.results.checked_files import predict
+from ballplate.results.prediction import predict
 from ballplate.simulator.experiment.construction import with_chosen
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment, Position

@@ -7,7 +7,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from ballplate.results.checked_files import check
+from ballplate.results.prediction import check
 from ballplate.simulator.experiment.construction import placed_only
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import AtMost, Candidate, Experiment, Pool, Position

@@ -18,7 +18,7 @@ from ballplate.extensions.planning.criteria import CriterionName
 from ballplate.extensions.planning.experiment_file import experiment_text
 from ballplate.extensions.planning.schedule import run_sheet
 from ballplate.extensions.planning.selection import Campaign
-from ballplate.results.checked_files import planned_uncertainty, predict
+from ballplate.results.prediction import planned_uncertainty, predict
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.construction import with_chosen
 from ballplate.simulator.experiment.layout import lay_out

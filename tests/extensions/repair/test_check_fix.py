@@ -11,7 +11,7 @@ import ballplate as bp
 import pytest
 import yaml
 from ballplate.cli import main
-from ballplate.results.checked_files import check
+from ballplate.results.prediction import check
 from ballplate.simulator.experiment.loading import load
 
 from tests.extensions.repair import wording

@@ -12,7 +12,7 @@ import pytest
 from ballplate.extensions.repair.mending import mended
 from ballplate.extensions.repair.repair_search import repairs
 from ballplate.extensions.repair.repairs import Repair
-from ballplate.results.checked_files import check
+from ballplate.results.prediction import check
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError

@@ -25,7 +25,8 @@ from ballplate.extensions.repair.repairs import Repairs
 from ballplate.extensions.repair.search import Losses, best_set, change_pool, mean_target
 from ballplate.extensions.repair.written import Edit
 from ballplate.presentation.formatting import number
-from ballplate.results.checked_files import Wanted, check, check_files, predict
+from ballplate.results.checked_files import Wanted, check_files
+from ballplate.results.prediction import check, predict
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import (

@@ -8,7 +8,7 @@ import pytest
 from ballplate.extensions.reproduction.compare import compare_rank
 from ballplate.extensions.reproduction.published import npl
 from ballplate.extensions.reproduction.shipped import Shipped, planned
-from ballplate.results.checked_files import check
+from ballplate.results.prediction import check
 from ballplate.simulator.experiment.loading import load
 
 STATEMENTS = [(one, design) for one in npl().ranks for design in one.designs]

@@ -23,8 +23,8 @@ from ballplate.extensions.reproduction.shipped import (
     sums_of_squares,
 )
 from ballplate.rank.verdicts import Verdict
-from ballplate.results.checked_files import check
 from ballplate.results.fits import Fit
+from ballplate.results.prediction import check
 from ballplate.simulator.experiment.model import Experiment
 
 # The tests below look at few fits, each of which is computed once.

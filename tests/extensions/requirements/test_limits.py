@@ -16,7 +16,7 @@ from ballplate.extensions.requirements.answers import Answer
 from ballplate.extensions.requirements.goals import Judgement, judge, parse_goal
 from ballplate.extensions.requirements.root_search import Tried, _scanned, _Searched, _Trials, reach
 from ballplate.extensions.requirements.unknowns import NotVariableError, unknown
-from ballplate.results.checked_files import predict
+from ballplate.results.prediction import predict
 from ballplate.simulator.experiment.loading import load
 
 from tests.extensions.planning.small_pool import TEXT

@@ -16,8 +16,7 @@ from ballplate.extensions.requirements.goals import Goal, GoalError, parse_goal
 from ballplate.extensions.requirements.root_search import reach
 from ballplate.extensions.requirements.steps import at_step, round_down, round_up, step_of
 from ballplate.extensions.requirements.unknowns import NotVariableError
-from ballplate.results.checked_files import predict
-from ballplate.results.prediction import Prediction
+from ballplate.results.prediction import Prediction, predict
 from ballplate.simulator.experiment.loading import load
 from scipy.optimize import brentq
 

@@ -15,7 +15,7 @@ pytest.importorskip("starlette", reason="the studio is an extra")
 from ballplate.extensions.maps.length_map import length_map
 from ballplate.extensions.studio.server import application
 from ballplate.extensions.studio.session import RefusedError, Session
-from ballplate.results.checked_files import predict
+from ballplate.results.prediction import predict
 from ballplate.simulator.experiment.loading import load
 from starlette.testclient import TestClient
 

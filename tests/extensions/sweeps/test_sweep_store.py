@@ -20,7 +20,7 @@ from ballplate.extensions.sweeps.model import Sweep
 from ballplate.extensions.sweeps.store import definitions, keys, open_store, results
 from ballplate.extensions.sweeps.task import CellResult, CellTask, compute
 from ballplate.montecarlo.experiments import trials
-from ballplate.results.checked_files import predict
+from ballplate.results.prediction import predict
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 
