@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from ballplate.presentation.formatting import (
@@ -22,9 +22,6 @@ from ballplate.simulator.machines.arrangement import (
     SquarenessError,
 )
 from ballplate.simulator.machines.protocol import Array, Unit
-
-if TYPE_CHECKING:
-    pass
 
 ARCSECOND = np.pi / (180.0 * 3600.0)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from ballplate.presentation.formatting import Data
@@ -14,9 +13,6 @@ from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.geometry.ball_layouts import AxesSettings, BallLayout
 from ballplate.simulator.inputs.number_arrays import Array
-
-if TYPE_CHECKING:
-    from ballplate.simulator.experiment.model import Experiment
 
 # A ball nominally this near to an axis, as a fraction of its distance from the origin, is meant to
 # be on it.

@@ -200,7 +200,6 @@ class Prediction(Result):
 
     def table_lines(self) -> list[str]:
         """Title, verdict and table, without replicates."""
-
         rank, *further = verdict_lines(self.verdict, lengths=self.lengths)
         qualified = self.qualified
         lines = [self.heading, rank, *further]
@@ -214,7 +213,6 @@ class Prediction(Result):
         return lines if self.assumptions is None else [*lines, "", *self.assumptions.summary()]
 
     def data(self) -> Data:
-
         data = {
             **self.named,
             **verdict_data(self.verdict),

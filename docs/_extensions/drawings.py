@@ -17,7 +17,7 @@ from ballplate.extensions.drafting.machine_tables import arrangement_of, chain_w
 from ballplate.extensions.drafting.shapes import VIEW, machine_shapes
 from ballplate.simulator.geometry.artefacts import GridSettings
 from ballplate.simulator.geometry.ball_layouts import BallLayout
-from ballplate.simulator.geometry.positions import (
+from ballplate.simulator.geometry.poses import (
     IN_PLANE_AXES,
     PlanePlacement,
     Pose,

@@ -1,4 +1,5 @@
-"""Uncertainty of any linear function of the parameters, from a factor, without a large matrix.
+"""Rank and null space from the singular values of a factor, and from it the uncertainty of any
+linear function of the parameters, without a large matrix.
 
 The covariance of the parameters is G G' with a square root G that has one block per ball: the part
 that its own rows leave, and the part shared with all others through poses and machine errors.

@@ -1,4 +1,6 @@
-"""Linearisation of an experiment at a state: layout, factor, spectrum and covariance together."""
+"""Linearisation of an experiment at a state: layout, factor, spectrum and covariance together; the
+same with some parameters held; and linear functions, whose uncertainties it gives.
+"""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ from .calibrated_coordinates import CalibratedBalls as CalibratedBalls
 from .calibrations import KINDS as KINDS, resolve_calibration as resolve_calibration
 from .certificate_tables import read_rows as read_rows
 from .changes import (
-    is_same_place as is_same_place,
+    _overlap as _overlap,
     node_at as node_at,
     node_of as node_of,
     override as override,
@@ -58,7 +58,6 @@ from .named_files import (
     runs_code as runs_code,
 )
 from .own_sections import check_installed as check_installed
-from .placements import check_turns as check_turns, resolve_positions as resolve_positions
 from .pool_sections import (
     GroupSettings as GroupSettings,
     LimitsSettings as LimitsSettings,
@@ -72,6 +71,7 @@ from .pool_sections import (
     is_group as is_group,
 )
 from .position_sections import Edges as Edges
+from .positions import check_turns as check_turns, resolve_positions as resolve_positions
 from .readings_section import (
     PLACE as PLACE,
     ColumnsSettings as ColumnsSettings,

@@ -87,7 +87,6 @@ def check_use(
             _check_balls_read(
                 name, [reader for reader in readers if reader.artefact == name], references
             )
-    calibration_count = len(sections.calibration)
     for name, settings in references.artefacts.items():
         with_one_length = isinstance(settings, TwoSpheresSettings | BryanGaugeSettings)
         if (
@@ -95,15 +94,12 @@ def check_use(
             and not with_one_length
             and not problems.has_below(("calibration",))
         ):
-            kinds = (
-                [
-                    calibration.kind
-                    for calibration in sections.calibration.values()
-                    if getattr(calibration, "artefact", "") in (name, None)
-                ]
-                if calibration_count
-                else []
-            )
+            # An item that names no artefact may be of any; one of the machine has no such key.
+            kinds = [
+                calibration.kind
+                for calibration in sections.calibration.values()
+                if getattr(calibration, "artefact", "") in (name, None)
+            ]
             if "distances" not in kinds and "coordinates" not in kinds:
                 text = (
                     "is a length standard without calibrated distances; add a calibration of kind:"

@@ -25,8 +25,8 @@ from .calibrations import resolve_calibration
 from .machine import resolve_evaluation, resolve_machine, resolve_noise
 from .model import Evaluation, Pool, Position, Prior, Probe
 from .own_sections import needed_service, resolve_own_sections
-from .placements import resolve_positions
 from .position_sections import PositionSettings
+from .positions import resolve_positions
 from .references import References
 from .sections import InfluenceSettings
 from .size_checks import check_size

@@ -10,12 +10,7 @@ import numpy as np
 from ballplate.simulator.design.objects import SLIGHTLY, Machine, Volume
 from ballplate.simulator.geometry.ball_layouts import BallLayout
 from ballplate.simulator.geometry.motions import AXIS_NAMES
-from ballplate.simulator.geometry.positions import (
-    AXIS_INDEX,
-    Pose,
-    balls_in_machine,
-    corners,
-)
+from ballplate.simulator.geometry.poses import AXIS_INDEX, Pose, balls_in_machine, corner_points
 from ballplate.simulator.inputs.messages import Steps
 from ballplate.simulator.inputs.number_arrays import Array, Indices
 from ballplate.simulator.inputs.problems import Problems
@@ -134,7 +129,7 @@ def outline(pose: Pose, layout: BallLayout, edge: float) -> Array:
     """Return the lowest and the highest co-ordinates (2, d) of a plate with `edge` of material
     beyond its balls.
     """
-    return extent(corners(pose, layout, edge))
+    return extent(corner_points(pose, layout, edge))
 
 
 def entered(around: Array, boxes: Array) -> Any:

@@ -12,7 +12,7 @@ from ballplate.simulator.design.observations.calibration import (
 from ballplate.simulator.design.observations.coordinates import CoordinateCalibration, far_spread
 from ballplate.simulator.geometry.ball_layouts import BallLayout, BallNames, frozen
 from ballplate.simulator.geometry.motions import AXIS_NAMES
-from ballplate.simulator.geometry.positions import Axis
+from ballplate.simulator.geometry.poses import Axis
 from ballplate.simulator.inputs.messages import Steps
 from ballplate.simulator.inputs.quantity_types import LengthUncertainty
 from ballplate.simulator.inputs.settings import Forms, Name, Text, hint, listing

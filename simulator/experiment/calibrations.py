@@ -1,7 +1,8 @@
 """All calibrations that a file may state: their kinds, and what is wrong with their values.
 
-A further one of the kernel is a file here, with its settings, its reader and its observations, and
-one line in `CALIBRATIONS`; extensions have their own.
+A further one of the kernel has its settings and its reader in a file beside this one (the radius of
+a gauge, which is short, has them here), its observations in `design.observations`, and a line in
+`CALIBRATIONS`; extensions have their own.
 """
 
 from __future__ import annotations

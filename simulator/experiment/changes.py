@@ -91,14 +91,6 @@ def node_at(root: Node, path: str) -> Node | None:
     return node
 
 
-def is_same_place(root: Node, path: str, second: str) -> bool:
-    """True if one of two paths leads to the other's node, or into it.
-
-    :raises ValueError: as ``node_at``.
-    """
-    return _overlap(place_of(root, path), place_of(root, second))
-
-
 def override(root: Node, path: str, value: Node, mark: Mark) -> Node:
     """Return the tree with the node at a path replaced; ``mark`` is the location of the override.
 

@@ -1,6 +1,4 @@
-"""Conversion of the settings of machine and evaluation into volume, repeatability, points and
-tasks.
-"""
+"""Volume and repeatability of the machine, noise of its readings, and where it is evaluated."""
 
 from __future__ import annotations
 
@@ -191,8 +189,8 @@ def _task(
 
 
 def target_of(sections: Sections, own_target: LengthFunction | None = None) -> Target | None:
-    """Return the target of uncertainties: a length of its `own_target`, or else the file's, with
-    its scope.
+    """Return the target of uncertainties, a task's `own_target` or else the file's, with the
+    coverage factor of what is compared with it.
     """
     target = own_target or sections.target_uncertainty
     return None if target is None else Target(target, sections.coverage_factor)

@@ -13,7 +13,7 @@ import numpy as np
 from ballplate.simulator.design.objects import Machine, Noise
 from ballplate.simulator.design.observations.calibration import Calibration
 from ballplate.simulator.geometry.ball_layouts import ArtefactSettings, BallLayout
-from ballplate.simulator.geometry.positions import Pose
+from ballplate.simulator.geometry.poses import Pose
 from ballplate.simulator.inputs.messages import ExperimentError, Message, Steps, format_path
 from ballplate.simulator.inputs.number_arrays import Array, Indices
 from ballplate.simulator.inputs.quantities import Target
@@ -239,10 +239,10 @@ class Experiment:
     statements. ``notes``: settings detected in its tables, and what plates no longer span.
     ``readings``: location and form of tables of readings. ``sections``: entries under keys that
     extensions provide. ``extensions``: names of required ones. ``tree``: the file's content without
-    variants, ``mark``: the location
-    of the experiment, and ``builder``: function from a tree to an experiment, with the ``trust``
-    in the file. ``switched_off``: names of positions of the file that are not read. ``faults``: of
-    an experiment that was loaded with them, to be changed and not to be evaluated; otherwise None.
+    variants, ``mark``: the location of the experiment, and ``builder``: function from a tree to an
+    experiment, with the ``trust`` in the file. ``switched_off``: names of positions of the file
+    that are not read. ``faults``: of an experiment that was loaded with them, to be changed and not
+    to be evaluated; otherwise None.
     """
 
     title: str

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, Union
 
-from ballplate.simulator.geometry.positions import Axis
+from ballplate.simulator.geometry.poses import Axis
 from ballplate.simulator.inputs.quantity_types import Duration, Length, Place, RoomPart
 from ballplate.simulator.inputs.settings import Forms, Name, NonEmpty, Settings, Several, Text
 from ballplate.simulator.inputs.validation import OpenKinds

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Literal, Self
 
 from ballplate.simulator.geometry.ball_layouts import BallNames, Coordinates
-from ballplate.simulator.geometry.positions import Axis
+from ballplate.simulator.geometry.poses import Axis
 from ballplate.simulator.inputs.quantity_types import Angle, Place, PositiveLength
 from ballplate.simulator.inputs.settings import Forms, Name, NonEmpty, Settings, Text
 from pydantic import Field, model_validator

@@ -10,7 +10,12 @@ from typing import Any
 
 import numpy as np
 from ballplate.simulator.design.objects import Volume
-from ballplate.simulator.geometry.ball_layouts import ArtefactSettings, BallLayout, corners, frozen
+from ballplate.simulator.geometry.ball_layouts import (
+    ArtefactSettings,
+    BallLayout,
+    corner_balls,
+    frozen,
+)
 from ballplate.simulator.inputs.messages import Step, Steps
 from ballplate.simulator.inputs.number_arrays import Array, Indices
 from ballplate.simulator.inputs.problems import Problems, written_text
@@ -137,7 +142,7 @@ class References:
             indices = np.arange(len(index))
         elif chosen == "corners":
             try:
-                indices = corners(layout)
+                indices = corner_balls(layout)
             except ValueError as error:
                 self.problems.add(steps, str(error))
                 return None

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from ballplate.simulator.design.objects import SLIGHTLY
-from ballplate.simulator.geometry.positions import ball_coordinates
+from ballplate.simulator.geometry.poses import ball_coordinates
 from ballplate.simulator.inputs.messages import ExperimentError
 from ballplate.simulator.inputs.number_arrays import Array
 from ballplate.simulator.inputs.yamltree import Node

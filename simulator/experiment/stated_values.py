@@ -17,6 +17,7 @@ from ballplate.simulator.design.observations.whitening import (
     IndefiniteError,
     covariance_root,
 )
+from ballplate.simulator.geometry.ball_layouts import frozen
 from ballplate.simulator.inputs.extensions import optional_service
 from ballplate.simulator.inputs.messages import ExperimentError, Steps
 from ballplate.simulator.inputs.problems import Problems
@@ -200,7 +201,7 @@ def uncertainties_of(
     if matrix is None and of_values is not None:
         common = _common(settings, of_values, lengths)
         if common is None:
-            return _frozen(of_values), None
+            return frozen(of_values), None
         matrix = common, np.zeros_like(common)
     assert matrix is not None
     size = np.sqrt(np.diag(matrix[0]))
@@ -216,7 +217,7 @@ def uncertainties_of(
         )
         return None
     root = _root_of(matrix, place, problems)
-    return None if root is None else (_frozen(size), root)
+    return None if root is None else (frozen(size), root)
 
 
 def _disagreement(
@@ -309,12 +310,6 @@ def _of_file(
         return None
     chosen = np.ix_(entry_of_name, entry_of_name)
     return matrix.is_correlation, matrix.values[chosen], matrix.rounding[chosen]
-
-
-def _frozen(values: Array) -> Array:
-    frozen = np.array(values, float)
-    frozen.setflags(write=False)
-    return frozen
 
 
 def read_digital(

@@ -126,9 +126,11 @@ class Sections:
 
     @property
     def parts(self) -> Iterator[Any]:
-        """All valid sections and entries, those of the pool and of lists one by one."""
+        """All valid sections and entries, those of the pool and of lists one by one; None where one
+        is missing.
+        """
         pool = vars(self.pool) if self.pool else {}
-        for value in (*vars(self).values(), *pool.values()):
+        for value in (*vars(replace(self, invalid=(), pool=None)).values(), *pool.values()):
             if isinstance(value, dict):
                 yield from value.values()
             else:
@@ -308,9 +310,7 @@ POOL_ENTRIES: dict[str, Callable[[Node], Any]] = {
 
 @cache
 def _form(key: str) -> Any:
-    if key in ENTRIES:
-        return ENTRIES[key][1]
-    field = ExperimentSettings.model_fields[key]
+    section = ExperimentSettings.model_fields[key]
     # A type together with the constraints of its field: by itself a section is validated as it
     # would be within the whole.
-    return Annotated[field.annotation, field]
+    return Annotated[section.annotation, section]

@@ -27,7 +27,7 @@ from .motions import (
     vector_from_rotation as vector_from_rotation,
     without_rigid_motion as without_rigid_motion,
 )
-from .positions import (
+from .poses import (
     AXIS_INDEX as AXIS_INDEX,
     IN_PLANE_AXES as IN_PLANE_AXES,
     QUARTER_TURNS as QUARTER_TURNS,
@@ -35,7 +35,7 @@ from .positions import (
     PlanePlacement as PlanePlacement,
     Pose as Pose,
     ball_coordinates as ball_coordinates,
-    corners as corners,
+    corner_points as corner_points,
     nominal_pose as nominal_pose,
     plane_rotation as plane_rotation,
 )

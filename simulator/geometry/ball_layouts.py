@@ -88,7 +88,7 @@ def pairs(layout: BallLayout, set_name: str) -> NDArray[np.intp]:
     return np.array(layout.pair_sets[set_name], dtype=np.intp).reshape(-1, 2)
 
 
-def corners(layout: BallLayout) -> NDArray[np.intp]:
+def corner_balls(layout: BallLayout) -> NDArray[np.intp]:
     """Return the indices of the corner balls, (k,).
 
     :raises ValueError: the artefact has no corners.

@@ -1,4 +1,6 @@
-"""Rigid motions: parameters, small rotations as vectors, and best fits of two point sets."""
+"""Rigid motions: parameters, small rotations as vectors, best fits of two point sets, and of a
+sphere to points.
+"""
 
 from __future__ import annotations
 
@@ -114,8 +116,8 @@ def fixes_pose(points: Array) -> bool:
 
 
 def rigid_motions(points: Array) -> Array:
-    """Return displacements (n, d, m) of points (n, d) by unit shifts and unit turns, to first
-    order.
+    """Return displacements (n, d, m) of points (n, d) by unit shifts and by unit turns about z, x
+    and y, in this order, to first order.
     """
     n, d = points.shape
     motions = np.zeros((n, d, d * (d + 1) // 2))

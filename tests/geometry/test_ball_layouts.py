@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from ballplate.simulator.geometry.artefacts import AnyArtefactSettings
-from ballplate.simulator.geometry.ball_layouts import BallLayout, corners, pairs
+from ballplate.simulator.geometry.ball_layouts import BallLayout, corner_balls, pairs
 from hypothesis import given, strategies as st
 from pydantic import TypeAdapter
 
@@ -39,7 +39,7 @@ def test_pair_sets_of_a_grid() -> None:
     assert len(pairs(GRID, "neighbours")) == 7
     assert ("r1c2", "r2c2") in named(GRID, "neighbours")
     assert len(pairs(GRID, "all")) == 15
-    assert [GRID.names[i] for i in corners(GRID)] == ["r1c1", "r1c3", "r2c1", "r2c3"]
+    assert [GRID.names[i] for i in corner_balls(GRID)] == ["r1c1", "r1c3", "r2c1", "r2c3"]
 
 
 @given(st.integers(2, 30))
@@ -53,7 +53,7 @@ def test_square_has_only_its_outline(per_side: int) -> None:
     np.testing.assert_allclose(
         np.linalg.norm(steps[:, 1] - steps[:, 0], axis=1), 0.5 / (per_side - 1)
     )
-    assert len(corners(square)) == 4
+    assert len(corner_balls(square)) == 4
 
 
 def test_sets_that_are_not_defined() -> None:
@@ -61,4 +61,4 @@ def test_sets_that_are_not_defined() -> None:
     with pytest.raises(ValueError, match=wording.IS_NOT_DEFINED_CHOOSE):
         pairs(balls, "neighbours")
     with pytest.raises(ValueError, match=wording.IS_NOT_DEFINED_LIST_THE_BALLS):
-        corners(balls)
+        corner_balls(balls)

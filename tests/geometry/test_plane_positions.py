@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from ballplate.simulator.geometry.artefacts import GridSettings
 from ballplate.simulator.geometry.ball_layouts import BallLayout
-from ballplate.simulator.geometry.positions import (
+from ballplate.simulator.geometry.poses import (
     AXIS_INDEX,
     IN_PLANE_AXES,
     Axis,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from ballplate.presentation import as_data
 from ballplate.simulator.experiment import Experiment
-from ballplate.simulator.geometry import AXIS_NAMES, corners
+from ballplate.simulator.geometry import AXIS_NAMES, corner_points
 from ballplate.simulator.machines import ARRANGEMENTS, Array
 
 from .machine_tables import table
@@ -56,7 +56,9 @@ def draft_shapes(experiment: Experiment) -> Iterator[Shape]:
     ends = np.array([volume.lower, volume.upper])
     yield from _box("volume", ends, 1 - SEEN)
     for place in experiment.positions:
-        yield Shape("plate", corners(place.pose, experiment.layouts[place.artefact]), place.name)
+        yield Shape(
+            "plate", corner_points(place.pose, experiment.layouts[place.artefact]), place.name
+        )
     yield from _box("volume", ends, SEEN)
     for name, end in zip(AXIS_NAMES, 1.08 * np.diag(volume.upper), strict=True):
         yield Shape("letter", end[None], name)

@@ -9,7 +9,7 @@ from enum import IntEnum
 import numpy as np
 from ballplate.simulator.design import Calibration
 from ballplate.simulator.experiment import Experiment, Position, Probe
-from ballplate.simulator.geometry import BallLayout, ball_coordinates, corners
+from ballplate.simulator.geometry import BallLayout, ball_coordinates, corner_points
 from ballplate.simulator.machines import Array
 
 
@@ -95,7 +95,7 @@ def is_possible(
         return False
     if pool is None or not len(pool.forbidden):
         return True
-    around = corners(position.pose, layout, pool.edge or 0.0)
+    around = corner_points(position.pose, layout, pool.edge or 0.0)
     low, high = around.min(axis=0), around.max(axis=0)
     enters = (low < pool.forbidden[:, 1]) & (high > pool.forbidden[:, 0])
     return not enters.all(axis=1).any()

@@ -11,7 +11,7 @@ from ballplate.extensions.repair.candidates import PLANES, probes_across
 from ballplate.extensions.repair.yamltext import TextChange
 from ballplate.presentation import Data
 from ballplate.simulator.experiment import Experiment, Position
-from ballplate.simulator.geometry import AXIS_INDEX, IN_PLANE_AXES, Axis, corners
+from ballplate.simulator.geometry import AXIS_INDEX, IN_PLANE_AXES, Axis, corner_points
 from ballplate.simulator.inputs import to_python, typed_length
 
 # Outlines that are drawn.
@@ -34,7 +34,7 @@ def pool_of(experiment: Experiment) -> Data:
     places = [item for item in items if isinstance(item, Position)]
     outlines: dict[Any, None] = {}
     for place in places:
-        rows = np.round(corners(place.pose, experiment.layouts[place.artefact]), 5).tolist()
+        rows = np.round(corner_points(place.pose, experiment.layouts[place.artefact]), 5).tolist()
         outlines.setdefault(tuple(map(tuple, rows)))
     artefact = next(iter(experiment.layouts))
     planes: dict[str, Axis | None] = dict(zip(PLANES, PLANES, strict=True))

@@ -12,10 +12,11 @@ from typing import Any
 
 from ballplate.simulator.experiment import (
     Experiment,
+    _overlap,
     build,
-    is_same_place,
     node_at,
     override,
+    place_of,
     python_models,
     variant_trees,
 )
@@ -314,3 +315,11 @@ def _check_base(sweep: Sweep) -> None:
                 return
             messages |= set(errors)
         raise ExperimentError(sorted(messages)) from None
+
+
+def is_same_place(root: Node, path: str, second: str) -> bool:
+    """True if one of two paths leads to the other's node, or into it.
+
+    :raises ValueError: as ``node_at``.
+    """
+    return _overlap(place_of(root, path), place_of(root, second))

@@ -8,7 +8,7 @@ import numpy as np
 from ballplate.simulator.experiment.construction import with_chosen
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment, Position
-from ballplate.simulator.geometry.positions import ball_coordinates
+from ballplate.simulator.geometry.poses import ball_coordinates
 from ballplate.simulator.machines.protocol import Array
 
 BRIDGE = {

@@ -13,7 +13,7 @@ from ballplate.extensions.planning.constraints import Budget, constraints
 from ballplate.extensions.planning.schedule import ordered, run_sheet
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Candidate, ChangeTimes, Position, ReadingGroup
-from ballplate.simulator.geometry.positions import Pose
+from ballplate.simulator.geometry.poses import Pose
 from hypothesis import given, settings, strategies as st
 
 CHANGES = ChangeTimes(probe=120.0, plane=1800.0)

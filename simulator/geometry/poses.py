@@ -155,7 +155,7 @@ def bounding_rectangle(layout: BallLayout) -> Array:
     return np.array([plane.min(axis=0), plane.max(axis=0)])
 
 
-def corners(pose: Pose, layout: BallLayout, edge: float = 0.0) -> Array:
+def corner_points(pose: Pose, layout: BallLayout, edge: float = 0.0) -> Array:
     """Return the corners (4, d), in order round it, of the rectangle around an artefact's balls and
     an `edge` of material beyond them.
     """

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 from ballplate.simulator.geometry.ball_layouts import BallLayout
-from ballplate.simulator.geometry.positions import (
+from ballplate.simulator.geometry.poses import (
     AXIS_INDEX,
     IN_PLANE_AXES,
     Axis,
