@@ -104,6 +104,7 @@ def run(options: Namespace) -> int:
     )
     paths = matching_files(options.files)
     if options.format == "junit":
+        # Refused before the work where its extension is missing.
         service("junit_report")
     files, statuses = [], [AS_EXPECTED]
     with progress(options) as shown:

@@ -215,7 +215,8 @@ def _weak_roots(at: Linearisation, target: Target | None) -> tuple[Array, Array]
     # Relative to one another: a motion of all corrected points as one body is no error of the
     # machine.
     change = relative_changes(at.design, at.layout, at.shared)
-    # All directions together have less effect than that: none is weak.
+    # All directions together have less than half of that effect, a margin for rounding: none is
+    # weak, and their decomposition is spared.
     if 2.0 * (change**2).sum() <= 0.5 * limit**2 * change[:, :, :1].size:
         return np.zeros((len(at.layout), 0)), np.zeros(0)
     root, effect = _principal(at)

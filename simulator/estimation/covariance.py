@@ -217,7 +217,8 @@ def spectrum(factor: Factor, drawn: Spectrum | None = None) -> Spectrum:
     # An orthonormal basis of all directions across the open ones, in scaled parameters.
     spanned = np.linalg.qr(null, mode="complete")[0][:, deficiency:]
     values, directions = _determined(factor, scale, spanned)
-    # Rounding alone is left of what counts as zero.
+    # Weighted values of null directions would be rounding, and mislead. They are reported with the
+    # gap that comparable weights show.
     below = values[-1] / gap if len(values) else 0.0
     return Spectrum(
         np.append(values, np.full(deficiency, below)),

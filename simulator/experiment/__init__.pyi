@@ -17,9 +17,9 @@ from .calibrated_coordinates import CalibratedBalls as CalibratedBalls
 from .calibrations import KINDS as KINDS, resolve_calibration as resolve_calibration
 from .certificate_tables import read_rows as read_rows
 from .changes import (
-    _overlap as _overlap,
     node_at as node_at,
     node_of as node_of,
+    overlap as overlap,
     override as override,
     place_of as place_of,
     variant_trees as variant_trees,

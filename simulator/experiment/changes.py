@@ -67,7 +67,7 @@ def variant_trees(root: Node, problems: Problems) -> dict[str, Node]:
                 # other would depend on their order.
                 place = place_of(base, path)
                 overlapping = next(
-                    (p for p, steps in places.items() if _overlap(steps, place)), None
+                    (p for p, steps in places.items() if overlap(steps, place)), None
                 )
                 if overlapping is not None:
                     raise ValueError(f'overlaps the path "{overlapping}"; replace it once')
@@ -148,7 +148,7 @@ def place_of(root: Node, path: str) -> tuple[str, ...]:
     return tuple(parts)
 
 
-def _overlap(first: tuple[str, ...], second: tuple[str, ...]) -> bool:
+def overlap(first: tuple[str, ...], second: tuple[str, ...]) -> bool:
     shorter = min(len(first), len(second))
     return first[:shorter] == second[:shorter]
 

@@ -218,6 +218,7 @@ def parse_tree(text: str, file: str, substituted: list[Message] | None = None) -
         # Since 6.0.4, PyYAML refuses a thousand brackets in a line before it yields the first.
         end = error.problem_mark
         if end is not None and "nesting depth" in str(error.problem):
+            # What is left is deeper than `DEEPEST` already, and refused with the line.
             return parse_tree(text[: end.index], file)
         builder.messages.append(_syntax_message(error, text, file))
         builder.root = None

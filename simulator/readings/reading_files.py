@@ -55,6 +55,7 @@ def write_readings(stream: TextIO, design: Design, readings: Readings, x: Array)
     columns = reading_columns(design, readings, x)
     writer.writerow(list(columns))
     for row in zip(*columns.values(), strict=True):
+        # NaN, which differs from itself, is what is not read.
         writer.writerow([*row[:3], *("" if v != v else repr(v) for v in row[3:])])
 
 

@@ -12,9 +12,9 @@ from typing import Any
 
 from ballplate.simulator.experiment import (
     Experiment,
-    _overlap,
     build,
     node_at,
+    overlap,
     override,
     place_of,
     python_models,
@@ -322,4 +322,4 @@ def is_same_place(root: Node, path: str, second: str) -> bool:
 
     :raises ValueError: as ``node_at``.
     """
-    return _overlap(place_of(root, path), place_of(root, second))
+    return overlap(place_of(root, path), place_of(root, second))

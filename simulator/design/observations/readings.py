@@ -109,6 +109,7 @@ def reading_blocks(
         x = true - p
         residual = np.zeros_like(x)
     else:
+        # The correction contains the probe's offset: without errors it is p.
         off = x + design.model.error(x, state.a, p) - true
         residual = weight * (off if shift is None else off - shift)
     by_model = design.model.jacobian(x, state.a, p)
