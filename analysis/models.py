@@ -7,7 +7,9 @@ on error models and on certificates.
 
 from __future__ import annotations
 
+from ballplate.simulator.inputs.number_arrays import Array
+
 from .simulator.design.observations.balls import BallFunctions
-from .simulator.machines.protocol import Array, ErrorModel, Parameter, Reported, Unit
+from .simulator.machines.protocol import ErrorModel, Parameter, Reported, Unit
 
 __all__ = ["Array", "BallFunctions", "ErrorModel", "Parameter", "Reported", "Unit"]

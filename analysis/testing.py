@@ -20,7 +20,8 @@ from ballplate.simulator.design.measurement import (
 from ballplate.simulator.design.observations.balls import BallFunctions
 from ballplate.simulator.design.parameters import shared_layout
 from ballplate.simulator.estimation.gauss_newton import moved
-from ballplate.simulator.machines.protocol import Array, ErrorModel
+from ballplate.simulator.inputs.number_arrays import Array
+from ballplate.simulator.machines.protocol import ErrorModel
 
 __all__ = ["check_ball_functions", "check_influence", "check_model", "check_observations"]
 

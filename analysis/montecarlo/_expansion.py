@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from ballplate.simulator.design.observations.readings import OFFSET_STEP, offset_sensitivity
-from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers
+from ballplate.simulator.inputs.number_arrays import Array, Integers
+from ballplate.simulator.machines.protocol import ErrorModel
 
 # Step of central differences, in metres.
 STEP = 1e-4

@@ -16,7 +16,8 @@ from ballplate.simulator.estimation.elimination import Factor
 from ballplate.simulator.estimation.gauss_newton import Solution, iterate
 from ballplate.simulator.estimation.initial import initial_state
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
-from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers
+from ballplate.simulator.inputs.number_arrays import Array, Integers
+from ballplate.simulator.machines.protocol import ErrorModel
 from ballplate.simulator.readings.simulated import true_readings
 
 from ._expansion import Direct, LocalModel, expand

@@ -17,14 +17,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from ballplate.simulator.computing.processes import single_threaded
-from ballplate.simulator.design.objects import Flags
 from ballplate.simulator.design.observations.lengths import Lengths, length_values, length_whitening
 from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.design.state import Replicates, State
 from ballplate.simulator.estimation.covariance import solve_balls, solve_kept, solve_shared
 from ballplate.simulator.estimation.gauss_newton import Solution
 from ballplate.simulator.geometry.motions import cross_matrices, vector_from_rotation
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.inputs.number_arrays import Array, Flags, Integers
 
 from ._reference import PositionReadings, Reference, complete_fit
 

@@ -21,7 +21,7 @@ from ballplate.simulator.estimation.functions import (
 )
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.geometry.motions import vector_from_rotation
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.inputs.number_arrays import Array, Integers
 from ballplate.uncertainty.pairs import pairs_of
 from ballplate.uncertainty.quantities import QUANTITIES, functions_of
 

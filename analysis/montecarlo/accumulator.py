@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from operator import add
 
 import numpy as np
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.inputs.number_arrays import Array
 
 from ._reference import Reference
 from ._replicates import Estimates

@@ -15,7 +15,8 @@ from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.estimation.linearisation import linearise
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
-from ballplate.simulator.machines.protocol import Array, ErrorModel, Parameter, Reported
+from ballplate.simulator.inputs.number_arrays import Array
+from ballplate.simulator.machines.protocol import ErrorModel, Parameter, Reported
 from ballplate.simulator.readings.simulated import NoReadingError, on_stated_machine
 
 from ._reference import DivergedError, Reference, Truth, reference

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.inputs.number_arrays import Array
 
 from .scenes import Box, DrawnPosition, names_fit, scene
 from .svg import (

@@ -11,8 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.measurement import locations, nominal_state
-from ballplate.simulator.inputs.number_arrays import Flags
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.inputs.number_arrays import Array, Flags
 
 from .svg import (
     MARKERS,

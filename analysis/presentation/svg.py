@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from ballplate.simulator.inputs.arguments import ensure_path
 from ballplate.simulator.inputs.messages import in_one_line
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.inputs.number_arrays import Array
 
 from .files import write_file
 
 if TYPE_CHECKING:
-    from ballplate.simulator.machines.protocol import Array
+    from ballplate.simulator.inputs.number_arrays import Array
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 

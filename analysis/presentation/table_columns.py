@@ -18,8 +18,8 @@ from html import escape
 from itertools import repeat
 from typing import TYPE_CHECKING, Any
 
+from ballplate.simulator.inputs.number_arrays import Array
 from ballplate.simulator.inputs.writing import CsvWriter
-from ballplate.simulator.machines.protocol import Array
 
 from .formatting import Data, aligned, amount_of, ascii_units, number, to_uncertainty, unit_of
 

@@ -9,8 +9,9 @@ from ballplate.simulator.computing.numerics import above, comparable, lstsq
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.geometry.motions import without_rigid_motion
+from ballplate.simulator.inputs.number_arrays import Array
 from ballplate.simulator.machines.arrangement import AXIS_ERRORS
-from ballplate.simulator.machines.protocol import Array, HasLines
+from ballplate.simulator.machines.protocol import HasLines
 
 from .directions import ArtefactPart, Direction, FunctionPart, LengthPart, PositionPart
 

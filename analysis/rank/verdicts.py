@@ -15,8 +15,8 @@ from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.geometry.motions import without_rigid_motion
+from ballplate.simulator.inputs.number_arrays import Array, Integers
 from ballplate.simulator.inputs.quantities import Target
-from ballplate.simulator.machines.protocol import Array, Integers
 
 if TYPE_CHECKING:
     from .directions import Direction

@@ -15,13 +15,14 @@ from ballplate.presentation.formatting import (
     Data,
     by_name,
 )
+from ballplate.simulator.inputs.number_arrays import Array
 from ballplate.simulator.inputs.settings import number_of
 from ballplate.simulator.machines.arrangement import (
     SQUARENESS_ERRORS,
     TRANSLATIONS,
     SquarenessError,
 )
-from ballplate.simulator.machines.protocol import Array, Unit
+from ballplate.simulator.machines.protocol import Unit
 
 ARCSECOND = np.pi / (180.0 * 3600.0)
 

@@ -22,8 +22,9 @@ from ballplate.simulator.geometry.motions import (
     vector_from_rotation,
 )
 from ballplate.simulator.inputs.arguments import ensure_type
+from ballplate.simulator.inputs.number_arrays import Array, Integers
 from ballplate.simulator.inputs.settings import hint, number_of, shorten
-from ballplate.simulator.machines.protocol import Array, Integers, Unit
+from ballplate.simulator.machines.protocol import Unit
 from ballplate.uncertainty.quantities import task_distances
 
 ParameterKind = Literal["machine", "origin", "rotation", "offset", "length", "influence", "ball"]

@@ -10,8 +10,8 @@ from ballplate.presentation.formatting import Data
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.inputs.extensions import MissingExtensionError, service
+from ballplate.simulator.inputs.number_arrays import Array
 from ballplate.simulator.inputs.yamltree import Mark
-from ballplate.simulator.machines.protocol import Array
 
 if TYPE_CHECKING:
     from ballplate.simulator.estimation.gauss_newton import Solution

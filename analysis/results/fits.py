@@ -14,7 +14,7 @@ from ballplate.presentation.scenes import Vectors, box_edges, draw_vectors, proj
 from ballplate.presentation.table_columns import MainTable
 from ballplate.simulator.inputs.arguments import ensure_positive, ensure_type
 from ballplate.simulator.inputs.extensions import function, service
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.inputs.number_arrays import Array
 
 from ._fit_findings import FitFindings
 from ._fit_tables import fit_data, fit_lines

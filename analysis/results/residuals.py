@@ -18,8 +18,9 @@ from ballplate.simulator.design.observations.readings import reading_blocks
 from ballplate.simulator.estimation.gauss_newton import Solution
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.geometry.motions import AXIS_NAMES
+from ballplate.simulator.inputs.number_arrays import Array, Integers
 from ballplate.simulator.machines.arrangement import AXIS_ERRORS
-from ballplate.simulator.machines.protocol import Array, HasLines, Integers, Unit
+from ballplate.simulator.machines.protocol import HasLines, Unit
 
 # Residuals that a fit reports.
 LARGEST = 10

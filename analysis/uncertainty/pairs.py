@@ -10,9 +10,8 @@ import numpy as np
 from ballplate.simulator.computing.numerics import comparable, first_largest
 from ballplate.simulator.estimation.functions import Displacements
 from ballplate.simulator.geometry.motions import without_rigid_motion
-from ballplate.simulator.inputs.number_arrays import Flags
+from ballplate.simulator.inputs.number_arrays import Array, Flags, Integers
 from ballplate.simulator.inputs.quantities import LengthFunction
-from ballplate.simulator.machines.protocol import Array, Integers
 
 # Points on a side of a tile of pairs, whose products stay in cache.
 TILE = 256

@@ -22,8 +22,9 @@ from ballplate.simulator.estimation.linearisation import Linearisation, linearis
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
+from ballplate.simulator.inputs.number_arrays import Array
 from ballplate.simulator.inputs.settings import listing
-from ballplate.simulator.machines.protocol import Array, ErrorModel
+from ballplate.simulator.machines.protocol import ErrorModel
 
 from .pairs import PairSummary
 from .summaries import point_pairs

@@ -24,8 +24,8 @@ from ballplate.simulator.estimation.functions import (
     displacements,
 )
 from ballplate.simulator.estimation.linearisation import Linearisation
+from ballplate.simulator.inputs.number_arrays import Array
 from ballplate.simulator.inputs.quantities import Target
-from ballplate.simulator.machines.protocol import Array
 
 from .pairs import COVERAGE, PairSummary, PairTile, all_pairs, pairs_of
 from .quantities import DESCRIPTIONS, QUANTITIES, evaluation_points, functions_of

@@ -12,14 +12,14 @@ from pathlib import Path
 from typing import Any, ClassVar, Self, TypeVar, cast
 
 import numpy as np
-from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers, Unit
+from ballplate.simulator.inputs.number_arrays import Array, Flags, Integers
+from ballplate.simulator.machines.protocol import ErrorModel, Unit
 
 from .influence_quantities import DesignParts, Influence, InfluenceParameter
 from .objects import (
     Artefacts,
     Balls,
     EvaluationPoints,
-    Flags,
     Machine,
     Noise,
     Positions,

@@ -14,9 +14,10 @@ from pathlib import Path
 from typing import get_args
 
 import numpy as np
+from ballplate.simulator.inputs.number_arrays import Array, Integers
 from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.inputs.units import Units
-from ballplate.simulator.machines.protocol import Array, Integers, Unit
+from ballplate.simulator.machines.protocol import Unit
 
 from .objects import Artefacts, Balls, Machine, Positions, Probes, Readings
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 from ballplate.simulator.inputs.extensions import UnusableError
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.inputs.number_arrays import Array
 
 from .arrays import Design
 from .influence_quantities import Disturbed, Influence

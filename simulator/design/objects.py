@@ -9,10 +9,9 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from ballplate.simulator.inputs.number_arrays import Flags
+from ballplate.simulator.inputs.number_arrays import Array, Flags, Integers
 from ballplate.simulator.inputs.quantities import Target
 from ballplate.simulator.inputs.settings import Settings
-from ballplate.simulator.machines.protocol import Array, Integers
 from pydantic import Field
 
 # Fraction of the volume by which scale readings may be outside: measured offsets of probes are no

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from ballplate.simulator.geometry.motions import AXIS_NAMES, pose_parameter_names, pose_size
-from ballplate.simulator.machines.protocol import Array, Integers, Parameter
+from ballplate.simulator.inputs.number_arrays import Array, Integers
+from ballplate.simulator.machines.protocol import Parameter
 
 from .arrays import Design
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.inputs.number_arrays import Array, Integers
 
 
 @dataclass(frozen=True)

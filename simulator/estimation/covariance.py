@@ -15,7 +15,7 @@ from ballplate.simulator.computing.numerics import svd
 from ballplate.simulator.computing.processes import scipy_linalg, single_threaded
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.parameters import SharedLayout
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.inputs.number_arrays import Array, Integers
 
 from .elimination import Factor
 

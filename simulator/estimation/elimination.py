@@ -27,7 +27,7 @@ from ballplate.simulator.design.observations.readings import reading_blocks, rea
 from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.design.state import State
 from ballplate.simulator.inputs.extensions import UnusableError
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.inputs.number_arrays import Array, Integers
 
 # Rows handled at once: enough for the matrix products to be efficient, few enough to stay in cache.
 ROWS_AT_ONCE = 2048

@@ -17,8 +17,9 @@ from ballplate.simulator.design.observations.readings import offset_sensitivity
 from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.design.state import State
 from ballplate.simulator.geometry.motions import AXIS_NAMES
+from ballplate.simulator.inputs.number_arrays import Array, Integers
 from ballplate.simulator.inputs.quantities import Target
-from ballplate.simulator.machines.protocol import Array, Integers, Unit
+from ballplate.simulator.machines.protocol import Unit
 
 from .covariance import (
     MICROMETRE,

@@ -12,7 +12,7 @@ from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.design.parameters import SharedLayout, shared_layout
 from ballplate.simulator.design.state import State
 from ballplate.simulator.geometry.motions import rotation_from_vector
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.inputs.number_arrays import Array
 
 from .covariance import (
     Spectrum,

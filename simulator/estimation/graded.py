@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from ballplate.simulator.computing.processes import scipy_linalg
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.inputs.number_arrays import Array, Integers
 
 # Rows that are collected, in multiples of the columns, before they are brought to a triangle.
 COLLECTED = 8

@@ -9,7 +9,7 @@ from ballplate.simulator.computing.numerics import eigvalsh
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.observations.balls import BallObservations, slopes_apart
 from ballplate.simulator.design.state import State
-from ballplate.simulator.machines.protocol import Array
+from ballplate.simulator.inputs.number_arrays import Array
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array

@@ -13,7 +13,6 @@ import numpy as np
 from ballplate.simulator.computing.numerics import comparable, lstsq, svd
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.measurement import nominal_state
-from ballplate.simulator.design.objects import Flags
 from ballplate.simulator.design.observations.readings import seen_places
 from ballplate.simulator.design.state import State
 from ballplate.simulator.geometry.motions import (
@@ -23,7 +22,7 @@ from ballplate.simulator.geometry.motions import (
     rotation_from_vector,
     vector_from_rotation,
 )
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.inputs.number_arrays import Array, Flags, Integers
 
 # Points whose spread across their main line is below this fraction of their length do not fix a
 # pose.

@@ -14,7 +14,7 @@ from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.measurement import nominal_state
 from ballplate.simulator.design.parameters import SharedLayout, shared_layout
 from ballplate.simulator.design.state import State
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.inputs.number_arrays import Array, Integers
 
 from .covariance import MICROMETRE, BallCovariance, Spectrum, ball_covariance, in_order, spectrum
 from .elimination import Factor, eliminate

@@ -13,10 +13,10 @@ from ballplate.simulator.design.observations.calibration import (
 from ballplate.simulator.design.observations.distances import DistanceCalibration
 from ballplate.simulator.geometry.ball_layouts import COINCIDENT, BallLayout, frozen, pairs
 from ballplate.simulator.inputs.messages import Steps
+from ballplate.simulator.inputs.number_arrays import Array
 from ballplate.simulator.inputs.quantity_types import PositiveLength, UncertaintyFunction
 from ballplate.simulator.inputs.settings import Forms, Name, NonEmpty, Settings, Text, hint, listing
 from ballplate.simulator.inputs.yamltree import mark_of
-from ballplate.simulator.machines.protocol import Array
 from numpy.typing import NDArray
 from pydantic import Field
 

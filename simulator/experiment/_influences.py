@@ -21,7 +21,7 @@ from ballplate.simulator.design.measurement import (
 )
 from ballplate.simulator.design.observations.priors import Priors
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.machines.protocol import Integers
+from ballplate.simulator.inputs.number_arrays import Integers
 
 from .model import Experiment, Position
 from .references import References

@@ -13,7 +13,7 @@ from ballplate.simulator.design.observations.distances import DistanceCalibratio
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.design.observations.whitening import at_least_exact
 from ballplate.simulator.geometry.artefacts import BryanGaugeSettings, TwoSpheresSettings
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.inputs.number_arrays import Array, Integers
 
 from .model import Experiment
 

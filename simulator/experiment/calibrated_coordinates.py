@@ -14,9 +14,9 @@ from ballplate.simulator.geometry.ball_layouts import BallLayout, BallNames, fro
 from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.geometry.poses import Axis
 from ballplate.simulator.inputs.messages import Steps
+from ballplate.simulator.inputs.number_arrays import Array
 from ballplate.simulator.inputs.quantity_types import LengthUncertainty
 from ballplate.simulator.inputs.settings import Forms, Name, Text, hint, listing
-from ballplate.simulator.machines.protocol import Array
 from numpy.typing import NDArray
 from pydantic import Field
 

@@ -22,10 +22,10 @@ from ballplate.simulator.design.observations.distances import RadiusCalibration
 from ballplate.simulator.geometry.artefacts import BallLayout, BryanGaugeSettings
 from ballplate.simulator.inputs.extensions import provided
 from ballplate.simulator.inputs.messages import Steps
+from ballplate.simulator.inputs.number_arrays import Array
 from ballplate.simulator.inputs.quantity_types import LengthUncertainty, PositiveLength
 from ballplate.simulator.inputs.settings import Name, Settings, listing
 from ballplate.simulator.inputs.validation import OpenKinds
-from ballplate.simulator.machines.protocol import Array
 from pydantic import Field
 
 from ._calibrated_distances import DistancesSettings, read_distances

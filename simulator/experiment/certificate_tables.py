@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from ballplate.simulator.inputs.messages import ExperimentError, Steps
+from ballplate.simulator.inputs.number_arrays import Array
 from ballplate.simulator.inputs.settings import shorten
-from ballplate.simulator.machines.protocol import Array
 
 from .references import References
 

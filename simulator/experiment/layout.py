@@ -14,7 +14,6 @@ from ballplate.simulator.design.objects import (
     Artefacts,
     Balls,
     EvaluationPoints,
-    Flags,
     Positions,
     Probes,
     Tasks,
@@ -37,9 +36,8 @@ from ballplate.simulator.geometry.artefacts import BryanGaugeSettings
 from ballplate.simulator.geometry.motions import pose_size
 from ballplate.simulator.inputs.extensions import UnusableError
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.inputs.number_arrays import Integers
+from ballplate.simulator.inputs.number_arrays import Array, Flags, Integers
 from ballplate.simulator.inputs.yamltree import Mark
-from ballplate.simulator.machines.protocol import Array
 from ballplate.simulator.machines.settings import build_error_model
 
 from ._influences import with_influences

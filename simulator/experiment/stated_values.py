@@ -20,11 +20,11 @@ from ballplate.simulator.design.observations.whitening import (
 from ballplate.simulator.geometry.ball_layouts import frozen
 from ballplate.simulator.inputs.extensions import optional_service
 from ballplate.simulator.inputs.messages import ExperimentError, Steps
+from ballplate.simulator.inputs.number_arrays import Array
 from ballplate.simulator.inputs.problems import Problems
 from ballplate.simulator.inputs.quantity_types import CommonPart
 from ballplate.simulator.inputs.settings import Settings, Text, hint, listing, shorten
 from ballplate.simulator.inputs.yamltree import Mark
-from ballplate.simulator.machines.protocol import Array
 from pydantic import Field
 
 from .references import References

@@ -17,10 +17,11 @@ from itertools import product
 import numpy as np
 from ballplate.simulator.geometry.ball_layouts import even_grid
 from ballplate.simulator.geometry.motions import cross_matrices
+from ballplate.simulator.inputs.number_arrays import Array
 
 from ._rigid_chain import rotation_and_derivatives
 from ._terms import Terms
-from .protocol import Array, Line, Parameter, Reported, Unit
+from .protocol import Line, Parameter, Reported, Unit
 
 FUNCTIONS = {
     "EX": "error in X",

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from ballplate.simulator.inputs.number_arrays import Array
 
 from .arrangement import AXES, Arrangement
-from .protocol import Array
 
 
 def _plane_rotation(angle: Array, about: int, derivative: bool = False) -> Array:

@@ -14,10 +14,10 @@ from itertools import product
 
 import numpy as np
 from ballplate.simulator.geometry.ball_layouts import even_grid
+from ballplate.simulator.inputs.number_arrays import Array
 
 from ._basis_settings import VARIABLES, RadialName
 from .bases import Basis, Monomial, Quoted, whole_values
-from .protocol import Array
 
 
 @dataclass(frozen=True)

@@ -16,9 +16,8 @@ from functools import cached_property
 from typing import ClassVar, Literal, Protocol
 
 import numpy as np
+from ballplate.simulator.inputs.number_arrays import Array
 from numpy.polynomial import chebyshev, polynomial
-
-from .protocol import Array
 
 
 @dataclass(frozen=True)

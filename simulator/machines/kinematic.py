@@ -13,6 +13,7 @@ from functools import cached_property, lru_cache
 from typing import ClassVar
 
 import numpy as np
+from ballplate.simulator.inputs.number_arrays import Array
 
 from .arrangement import (
     AXES,
@@ -23,7 +24,7 @@ from .arrangement import (
     SquarenessError,
 )
 from .bases import Basis, Polynomial, Quoted, SingleFunction
-from .protocol import Array, ErrorModel, HasLines, Line, Parameter, Reported
+from .protocol import ErrorModel, HasLines, Line, Parameter, Reported
 
 # Straightness held at zero at the far end, so that the frame's axes are those of the machine: the x
 # axis gives the direction of x, and the plane of the x and y axes is the xy plane (NPL section

@@ -11,8 +11,9 @@ from typing import Literal
 
 import numpy as np
 from ballplate.simulator.computing.numerics import eigvalsh
+from ballplate.simulator.inputs.number_arrays import Array
 
-from .protocol import Array, Parameter, Reported
+from .protocol import Parameter, Reported
 
 Scale = Literal["none", "x", "y", "split"]
 

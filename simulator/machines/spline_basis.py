@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from ballplate.simulator.inputs.number_arrays import Array
 
 from .bases import SMALLEST_PIECE, Ends, Quoted
-from .protocol import Array
 
 
 @dataclass(frozen=True)

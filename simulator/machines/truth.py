@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args
 
 import numpy as np
 from ballplate.simulator.computing.numerics import lstsq
+from ballplate.simulator.inputs.number_arrays import Array
 from ballplate.simulator.inputs.quantities import PARSERS, QuantityError
 from ballplate.simulator.inputs.quantity_types import Angle, PositiveLength
 from ballplate.simulator.inputs.settings import Settings, hint
@@ -16,7 +17,7 @@ from ballplate.simulator.inputs.validation import OpenKinds
 from pydantic import Field
 
 from .arrangement import AXIS_ERRORS, SQUARENESS_ERRORS, AxisError
-from .protocol import Array, Corner, ErrorModel, HasLines, TrueMachine
+from .protocol import Corner, ErrorModel, HasLines, TrueMachine
 from .settings import ErrorModelSettings, build_error_model, with_defaults
 
 

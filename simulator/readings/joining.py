@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 from ballplate.simulator.design.arrays import Design, Readings
 from ballplate.simulator.design.measurement import UnmatchedReadingsError, ensure_rows
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.inputs.number_arrays import Array, Integers
 
 # Indices of the position, the ball and the probe of a reading.
 ReadingKey = tuple[int, int, int]

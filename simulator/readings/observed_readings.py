@@ -12,9 +12,9 @@ from ballplate.simulator.design.measurement import ensure_rows, in_sequence
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.geometry.motions import fit_sphere
 from ballplate.simulator.inputs.extensions import MissingExtensionError, service
+from ballplate.simulator.inputs.number_arrays import Array, Integers
 from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.inputs.yamltree import Mark
-from ballplate.simulator.machines.protocol import Array, Integers
 
 from .joining import ReadingKey, reading_keys, rows_of
 

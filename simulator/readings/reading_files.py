@@ -21,12 +21,12 @@ from ballplate.simulator.inputs.messages import (
     Message,
     refused,
 )
+from ballplate.simulator.inputs.number_arrays import Array, Integers
 from ballplate.simulator.inputs.settings import hint, listing, number_of
 from ballplate.simulator.inputs.tables import FileRow
 from ballplate.simulator.inputs.units import LENGTH_UNITS
 from ballplate.simulator.inputs.writing import CsvWriter
 from ballplate.simulator.inputs.yamltree import GivenText, Mark
-from ballplate.simulator.machines.protocol import Array, Integers
 
 from .joining import ReadingKey, reading_keys, rows_of
 from .observed_readings import ObservedReadings, combine_standards

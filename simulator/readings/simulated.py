@@ -17,7 +17,8 @@ from ballplate.simulator.design.state import State
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
-from ballplate.simulator.machines.protocol import Array, ErrorModel
+from ballplate.simulator.inputs.number_arrays import Array
+from ballplate.simulator.machines.protocol import ErrorModel
 from ballplate.simulator.machines.truth import TrueMachine, true_machine
 
 

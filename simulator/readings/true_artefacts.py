@@ -10,7 +10,8 @@ from ballplate.simulator.design.observations.balls import slopes_apart
 from ballplate.simulator.design.observations.lengths import Lengths
 from ballplate.simulator.design.observations.whitening import at_least_exact
 from ballplate.simulator.design.state import State
-from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers
+from ballplate.simulator.inputs.number_arrays import Array, Integers
+from ballplate.simulator.machines.protocol import ErrorModel
 
 
 # In one piece: the order in which random numbers are drawn determines a seed's values.

@@ -7,8 +7,8 @@ from typing import Protocol, Self
 
 import numpy as np
 from ballplate.simulator.computing.numerics import svd
-from ballplate.simulator.inputs.number_arrays import Flags
-from ballplate.simulator.machines.protocol import Array, ErrorModel, Unit
+from ballplate.simulator.inputs.number_arrays import Array, Flags
+from ballplate.simulator.machines.protocol import ErrorModel, Unit
 
 from ..arrays import Design, Observations, Rows
 from ..state import Replicates, State

@@ -9,7 +9,8 @@ from typing import Any, ClassVar, Self, cast
 
 import numpy as np
 from ballplate.simulator.geometry.ball_layouts import BallLayout
-from ballplate.simulator.machines.protocol import Array, ErrorModel, Unit
+from ballplate.simulator.inputs.number_arrays import Array
+from ballplate.simulator.machines.protocol import ErrorModel, Unit
 
 from ..arrays import Design, Observations
 from ..state import State

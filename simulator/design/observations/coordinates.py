@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from ballplate.simulator.geometry.ball_layouts import BallLayout
 from ballplate.simulator.geometry.motions import AXIS_NAMES
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.inputs.number_arrays import Array, Integers
 from numpy.typing import NDArray
 
 from ..arrays import Design

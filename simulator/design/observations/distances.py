@@ -8,8 +8,9 @@ from typing import ClassVar, Literal
 
 import numpy as np
 from ballplate.simulator.geometry.ball_layouts import BallLayout
+from ballplate.simulator.inputs.number_arrays import Array, Integers
 from ballplate.simulator.inputs.quantities import LengthFunction
-from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers
+from ballplate.simulator.machines.protocol import ErrorModel
 from numpy.typing import NDArray
 
 from ..arrays import Design, Words

@@ -14,8 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from ballplate.simulator.computing.numerics import svd
-from ballplate.simulator.inputs.number_arrays import Flags
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.inputs.number_arrays import Array, Flags, Integers
 
 from ..objects import LengthArrays
 from .whitening import Whitening, whitening

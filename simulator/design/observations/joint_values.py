@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
-from ballplate.simulator.inputs.number_arrays import Flags
-from ballplate.simulator.machines.protocol import Array, Integers, Unit
+from ballplate.simulator.inputs.number_arrays import Array, Flags, Integers
+from ballplate.simulator.machines.protocol import Unit
 
 from ..arrays import Design, Rows
 from ..state import Replicates, State

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
-from ballplate.simulator.inputs.number_arrays import Flags
-from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers
+from ballplate.simulator.inputs.number_arrays import Array, Flags, Integers
+from ballplate.simulator.machines.protocol import ErrorModel
 
 from ..arrays import Design, Observations, Rows
 from ..measurement import locations, reading_noise

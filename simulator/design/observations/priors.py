@@ -7,10 +7,10 @@ from typing import ClassVar
 
 import numpy as np
 from ballplate.simulator.geometry.motions import vector_from_rotation, vector_rate
-from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers, Unit
+from ballplate.simulator.inputs.number_arrays import Array, Flags, Integers
+from ballplate.simulator.machines.protocol import ErrorModel, Unit
 
 from ..arrays import Design, Observations, Rows, Words
-from ..objects import Flags
 from ..parameters import shared_layout
 from ..state import State
 

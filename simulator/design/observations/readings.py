@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from ballplate.simulator.geometry.motions import cross_matrices, pose_size
-from ballplate.simulator.machines.protocol import Array, ErrorModel
+from ballplate.simulator.inputs.number_arrays import Array
+from ballplate.simulator.machines.protocol import ErrorModel
 
 from ..arrays import Design, Readings, measured
 from ..measurement import influence_shifts, locations, nominal_state, reading_uncertainties

@@ -17,7 +17,8 @@ from typing import ClassVar
 import numpy as np
 from ballplate.simulator.computing.numerics import lstsq, svd
 from ballplate.simulator.geometry.motions import AXIS_NAMES
-from ballplate.simulator.machines.protocol import Array, ErrorModel, Integers
+from ballplate.simulator.inputs.number_arrays import Array, Integers
+from ballplate.simulator.machines.protocol import ErrorModel
 
 from ..arrays import Design, Observations, Rows
 from ..parameters import shared_layout

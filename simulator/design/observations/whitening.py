@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from ballplate.simulator.computing.numerics import eigh
-from ballplate.simulator.machines.protocol import Array, Integers
+from ballplate.simulator.inputs.number_arrays import Array, Integers
 
 
 @dataclass(frozen=True)
