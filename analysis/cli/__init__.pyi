@@ -22,7 +22,6 @@ from .common import (
     trial_count as trial_count,
     whole as whole,
     write_noted as write_noted,
-    write_picture as write_picture,
 )
 from .dispatch import main as main
 from .notes import (

@@ -16,10 +16,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from .notes import note, tell_notes, warn
-from .outputs import PICTURE, UsageError, add_output, write
+from .outputs import PICTURE, add_output, write
 
 if TYPE_CHECKING:
-    from ballplate.presentation.files import Writer
     from ballplate.presentation.result import Result
     from ballplate.simulator.experiment.model import Experiment
 
@@ -202,17 +201,6 @@ def _picture(text: str) -> Path:
     if Path(text).suffix.lower() not in PICTURES:
         raise ArgumentTypeError(f'a picture\'s name ends in {", ".join(PICTURES)}, unlike "{text}"')
     return Path(text)
-
-
-def write_picture(options: Namespace, draw: Writer) -> None:
-    """Write the picture that the options name.
-
-    :raises UsageError: there are no data to draw.
-    """
-    try:
-        write(options, {options.plot: draw})
-    except ValueError as error:
-        raise UsageError(f"--plot: {error}") from None
 
 
 def write_noted(options: Namespace, contents: Contents) -> None:

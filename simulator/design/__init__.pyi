@@ -10,7 +10,6 @@ from .influence_quantities import (
     Disturbed as Disturbed,
     Influence as Influence,
     InfluenceParameter as InfluenceParameter,
-    or_unknown as or_unknown,
 )
 from .measurement import (
     disturbed_readings as disturbed_readings,

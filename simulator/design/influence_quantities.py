@@ -114,11 +114,6 @@ class Influence(ABC):
         """
 
 
-def or_unknown(uncertainty: float | None) -> float:
-    """Return a standard uncertainty, infinite if none is stated."""
-    return np.inf if uncertainty is None else uncertainty
-
-
 # Readings by which a kind is checked. More than there are axes, so that axes are not taken for
 # them.
 FEW = 7

@@ -130,11 +130,9 @@ def eliminate(design: Design, layout: SharedLayout, state: State, x: Array | Non
     the machine is taken to read without error, as for planning.
 
     :raises UnmatchedReadingsError: `x` has other rows.
-    :raises UnusableError: a plate's ball has fewer rows of its own than co-ordinates.
     """
     if x is not None:
         ensure_rows(design, design.readings, x)
-    _ensure_own_rows(design)
     if _differ(design, state):
         return _eliminate_graded(design, layout, state, x)
     return _eliminate_alike(design, layout, state, x)
@@ -202,15 +200,16 @@ def _eliminate_alike(design: Design, layout: SharedLayout, state: State, x: Arra
     )
 
 
-def _ensure_own_rows(design: Design) -> None:
+def ensure_own_rows(design: Design) -> None:
     """Refuse balls of plates whose own rows cannot determine them.
 
     Each R_i has to be regular: the rank is judged by the shared factor alone, which would be full
     beside a ball that nothing determines.
+
+    :raises UnusableError: a ball has fewer rows of its own than co-ordinates.
     """
-    plate = design.readings.select(design.plate_readings)
-    count = len(design.balls.names)
-    rows = np.bincount(plate.ball, measured(design, plate).sum(axis=1), count)
+    readings, count = design.readings, len(design.balls.names)
+    rows = np.bincount(readings.ball, measured(design, readings).sum(axis=1), count)
     for observation in design.observations:
         if len(observation) and observation.balls.shape[1] == 1:
             rows += np.bincount(observation.balls[:, 0], minlength=count)

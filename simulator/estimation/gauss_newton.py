@@ -23,7 +23,7 @@ from .covariance import (
     solve_shared,
     spectrum,
 )
-from .elimination import Factor, eliminate
+from .elimination import Factor, eliminate, ensure_own_rows
 from .linearisation import Linearisation, linearise
 
 Status = Literal["converged", "not converged", "diverged"]
@@ -132,6 +132,7 @@ def estimate(design: Design, x: Array, settings: GaussNewtonSettings | None = No
     """
     from .initial import initial_state
 
+    design.once(ensure_own_rows)
     start = initial_state(design, x)
     drawn = as_drawn(design)
     solution_held = iterate(design, x, start, settings, drawn)

@@ -17,7 +17,7 @@ from ballplate.simulator.design.state import State
 from ballplate.simulator.inputs.number_arrays import Array, Integers
 
 from .covariance import MICROMETRE, BallCovariance, Spectrum, ball_covariance, in_order, spectrum
-from .elimination import Factor, eliminate
+from .elimination import Factor, eliminate, ensure_own_rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +52,11 @@ class Linearisation:
 
     @property
     def deficiency(self) -> int:
+        """Number of undetermined directions of the shared parameters.
+
+        :raises UnusableError: a ball has fewer rows of its own than co-ordinates.
+        """
+        self.design.once(ensure_own_rows)
         return self.spectrum.deficiency
 
     @property
@@ -67,7 +72,7 @@ class Linearisation:
 
     @property
     def rank(self) -> int:
-        return self.spectrum.rank
+        return len(self.layout) - self.deficiency
 
     @property
     def as_drawn(self) -> Linearisation:

@@ -8,6 +8,7 @@ import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.simulator.design import Calibration, CovarianceRoot, Observations, Priors
+from ballplate.simulator.estimation import estimate
 from ballplate.simulator.inputs.extensions import UnusableError
 
 
@@ -16,7 +17,9 @@ def test_a_ball_that_is_not_read_is_refused() -> None:
     label = design.ball_label(3)
     unread = replace(design, readings=design.readings.select(design.readings.ball != 3))
     with pytest.raises(UnusableError, match=f"ball {label} has fewer readings than co-ordinates"):
-        bp.linearise(unread)
+        assert bp.linearise(unread).rank
+    with pytest.raises(UnusableError, match=f"ball {label} has"):
+        estimate(unread, np.zeros((len(unread.readings), 3)))
     kept = np.flatnonzero(design.readings.ball == 3)[:1]
     once = replace(
         design,

@@ -19,7 +19,6 @@ from ballplate.simulator.design import (
     Influence,
     InfluenceParameter,
     Readings,
-    or_unknown,
 )
 from ballplate.simulator.experiment import InfluenceSettings, References
 from ballplate.simulator.geometry import AXIS_NAMES, Name
@@ -36,6 +35,8 @@ from ballplate.simulator.inputs import (
 )
 from ballplate.simulator.machines import Array
 from pydantic import Field
+
+from .temperature import or_unknown
 
 HOUR = 3600.0
 TIME = "time"

@@ -12,18 +12,14 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from ballplate.simulator.design import (
-    DesignParts,
-    Disturbed,
-    Influence,
-    InfluenceParameter,
-    or_unknown,
-)
+from ballplate.simulator.design import DesignParts, Disturbed, Influence, InfluenceParameter
 from ballplate.simulator.experiment import InfluenceSettings, References
 from ballplate.simulator.geometry import AXIS_NAMES, Name
 from ballplate.simulator.inputs import NonEmpty, Ratio, Steps
 from ballplate.simulator.machines import Array, Integers
 from pydantic import Field
+
+from .temperature import or_unknown
 
 # Balls of a position that extend along an axis by less than this, in metres, tell nothing of the
 # scale there.

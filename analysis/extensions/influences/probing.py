@@ -11,18 +11,14 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from ballplate.simulator.design import (
-    DesignParts,
-    Disturbed,
-    Influence,
-    InfluenceParameter,
-    or_unknown,
-)
+from ballplate.simulator.design import DesignParts, Disturbed, Influence, InfluenceParameter
 from ballplate.simulator.experiment import InfluenceSettings, References
 from ballplate.simulator.geometry import Name
 from ballplate.simulator.inputs import Length, NonEmpty, Steps, hint
 from ballplate.simulator.machines import Array, Integers
 from pydantic import Field
+
+from .temperature import or_unknown
 
 # Offsets shorter than this, in metres, point nowhere.
 SHORTEST = 1e-6

@@ -11,13 +11,14 @@ from collections.abc import Mapping
 from typing import Literal
 
 import numpy as np
-from ballplate.simulator.design import DesignParts, or_unknown
+from ballplate.simulator.design import DesignParts
 from ballplate.simulator.experiment import InfluenceSettings, References
 from ballplate.simulator.geometry import Name
 from ballplate.simulator.inputs import Length, NonEmpty, Steps
 from pydantic import Field
 
 from .displacements import SharedDisplacements, displacements
+from .temperature import or_unknown
 
 
 class ReindexingSettings(InfluenceSettings):

@@ -14,13 +14,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
-from ballplate.simulator.design import (
-    DesignParts,
-    Disturbed,
-    Influence,
-    InfluenceParameter,
-    or_unknown,
-)
+from ballplate.simulator.design import DesignParts, Disturbed, Influence, InfluenceParameter
 from ballplate.simulator.experiment import InfluenceSettings, References
 from ballplate.simulator.geometry import AXIS_NAMES, Name
 from ballplate.simulator.inputs import (
@@ -37,6 +31,8 @@ from ballplate.simulator.inputs import (
 )
 from ballplate.simulator.machines import Array
 from pydantic import Field
+
+from .temperature import or_unknown
 
 QUADRATIC = {"x": ("x",), "y": ("y",), "both": ("x", "y")}
 Direction = Literal["x", "y", "z", "-x", "-y", "-z"]

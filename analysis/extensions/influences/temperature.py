@@ -14,14 +14,7 @@ from fractions import Fraction
 from typing import Literal
 
 import numpy as np
-from ballplate.simulator.design import (
-    DesignParts,
-    Disturbed,
-    Flags,
-    Influence,
-    InfluenceParameter,
-    or_unknown,
-)
+from ballplate.simulator.design import DesignParts, Disturbed, Flags, Influence, InfluenceParameter
 from ballplate.simulator.experiment import InfluenceSettings, References
 from ballplate.simulator.geometry import Name
 from ballplate.simulator.inputs import (
@@ -435,3 +428,8 @@ def _one_by_one(settings: Iterable[tuple[Steps, object]]) -> Iterator[tuple[Step
 
 
 SETTINGS = TemperaturesSettings
+
+
+def or_unknown(uncertainty: float | None) -> float:
+    """Return a standard uncertainty, infinite if none is stated."""
+    return np.inf if uncertainty is None else uncertainty

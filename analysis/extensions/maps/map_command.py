@@ -17,12 +17,14 @@ from ballplate.cli import (
     count,
     grid,
     whole,
-    write_picture,
+    write,
 )
 
 from .curves_command import show_errors
 
 if TYPE_CHECKING:
+    from ballplate.presentation import Writer
+
     from .map_places import Line
 
 
@@ -158,3 +160,14 @@ def run(options: Namespace) -> int:
         write_picture(options, errors.plot)
     show_errors(options, errors)
     return 0
+
+
+def write_picture(options: Namespace, draw: Writer) -> None:
+    """Write the picture that the options name.
+
+    :raises UsageError: there are no data to draw.
+    """
+    try:
+        write(options, {options.plot: draw})
+    except ValueError as error:
+        raise UsageError(f"--plot: {error}") from None
