@@ -46,7 +46,6 @@ from .prediction import (
 from .qualifications import (
     Qualification as Qualification,
     given_words as given_words,
-    of_pool as of_pool,
     qualification_data as qualification_data,
     qualifications_of as qualifications_of,
 )

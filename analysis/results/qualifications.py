@@ -14,10 +14,7 @@ from .extension_results import PredictedAssumptions
 from .text_blocks import scale_warnings
 
 if TYPE_CHECKING:
-    from ballplate.simulator.experiment.model import Experiment, Pool
-
-# Reasons for which a candidate is not offered that are those of probes, by their first words.
-OF_PROBES = ("out of reach", "outside the volume")
+    from ballplate.simulator.experiment.model import Experiment
 
 
 @dataclass(frozen=True)
@@ -51,20 +48,6 @@ def qualifications_of(
         if campaign.caution:
             text = f"warning: {campaign.file}: {campaign.caution}"
             yield Qualification("map", f"the map {campaign.file} in spite of its fit", text)
-
-
-def of_pool(pool: Pool) -> Iterator[Qualification]:
-    """Yield the qualification of a choice from a pool some of whose candidates probes do not
-    reach.
-    """
-    reasons = [
-        f"{count} {reason}"
-        for reason, count in pool.dropped.items()
-        if reason.startswith(OF_PROBES)
-    ]
-    if reasons:
-        text = f"warning: candidates not offered: {'; '.join(reasons)}"
-        yield Qualification("reach", "the reach of the probes", text)
 
 
 def given_words(qualified: Iterable[Qualification]) -> str:

@@ -24,7 +24,7 @@ from .changes import (
     place_of as place_of,
     variant_trees as variant_trees,
 )
-from .construction import placed_only as placed_only, with_chosen as with_chosen
+from .construction import placed_only as placed_only
 from .earlier_campaigns import (
     LEAST_SIGMA as LEAST_SIGMA,
     EarlierCampaign as EarlierCampaign,

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from ballplate.simulator.design.objects import Machine
-from ballplate.simulator.inputs.extensions import provided
+from ballplate.simulator.inputs.extensions import UnusableError, provided
 from ballplate.simulator.inputs.messages import ExperimentError, Steps
 from ballplate.simulator.machines.protocol import CustomModelError
 from ballplate.simulator.machines.settings import build_error_model, kind_of
@@ -89,7 +89,11 @@ def _true_machine(sections: Sections, machine: Machine | None, references: Refer
     if isinstance(truth, FurtherTrueMachine):
         read = provided("true_machines", vars(truth)["kind"], "read")
         assert read is not None
-        return read(truth, machine, references)
+        completed = read(truth, machine, references)
+        if not isinstance(completed, type(truth)):
+            text = f"read of kind {vars(truth)['kind']} returns {completed!r}; return the settings"
+            raise UnusableError(text)
+        return completed
     problems = references.problems
     if isinstance(truth, RandomSettings) and truth.position is None and truth.rotation is None:
         text = (

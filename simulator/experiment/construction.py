@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,23 +13,9 @@ from ballplate.simulator.machines.truth import with_model_defaults
 
 from ._resolution import Resolved
 from .machine import target_of
-from .model import Candidate, Evaluation, Experiment, Position
+from .model import Evaluation, Experiment
 from .own_sections import needed_extensions
 from .readings_section import no_settings
-
-
-def with_chosen(experiment: Experiment, chosen: Sequence[Candidate]) -> Experiment:
-    """The experiment with chosen candidates, in their order, as its positions, and as further
-    calibration.
-    """
-    items = [candidate.item for candidate in chosen]
-    positions = tuple(item for item in items if isinstance(item, Position))
-    calibration = tuple(item for item in items if not isinstance(item, Position))
-    return placed_only(
-        replace(
-            experiment, positions=positions, calibration=(*experiment.calibration, *calibration)
-        )
-    )
 
 
 def enabled_only(experiment: Experiment) -> Experiment:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_args
 
 import numpy as np
 from ballplate.simulator.computing.numerics import lstsq
+from ballplate.simulator.inputs.extensions import UnusableError
 from ballplate.simulator.inputs.number_arrays import Array
 from ballplate.simulator.inputs.quantities import PARSERS, QuantityError
 from ballplate.simulator.inputs.quantity_types import Angle, PositiveLength
@@ -123,10 +124,27 @@ def true_machine(
     array([0., 0., 0., 0., 0., 0.])
     """
     if isinstance(settings, FurtherTrueMachine):
-        return settings.true_machine(fitted, lower, upper)
+        return _of_extension(settings, fitted, lower, upper)
     own_model = getattr(settings, "error_model", None)
     model = fitted if own_model is None else build_error_model(own_model, lower, upper)
     return TrueMachine(model, true_parameters(settings, model))
+
+
+def _of_extension(
+    settings: FurtherTrueMachine, fitted: ErrorModel, lower: Corner, upper: Corner
+) -> TrueMachine:
+    """Return the machine of an extension's settings.
+
+    :raises UnusableError: it is none, or has not one finite value for each parameter of its model.
+    """
+    machine = settings.true_machine(fitted, lower, upper)
+    where = f"true_machine of {type(settings).__name__}"
+    if not isinstance(machine, TrueMachine):
+        raise UnusableError(f"{where} returns {machine!r}, and no TrueMachine")
+    count = len(machine.model.parameters)
+    if np.shape(machine.a) != (count,) or not np.isfinite(machine.a).all():
+        raise UnusableError(f"{where} needs {count} finite values a, one for each parameter")
+    return machine
 
 
 def true_parameters(settings: Settings, model: ErrorModel) -> Array:

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Any, Literal
+
 import numpy as np
 import pytest
+from ballplate.simulator.inputs.extensions import UnusableError
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.kinematic import kinematic_model
 from ballplate.simulator.machines.metric import MetricModel
+from ballplate.simulator.machines.protocol import Corner, ErrorModel, TrueMachine
+from ballplate.simulator.machines.settings import MetricSettings, build_error_model
 from ballplate.simulator.machines.truth import (
     CoefficientSettings,
+    FurtherTrueMachine,
     RandomSettings,
     TruthError,
     ZeroSettings,
@@ -130,3 +136,21 @@ def test_stated_errors_of_another_model() -> None:
 def test_the_true_machine_is_of_the_estimated_model_by_default() -> None:
     machine = true_machine(ZeroSettings(), MODEL, (0.0, 0.0, 0.0), (1.0, 1.0, 1.0))
     assert machine.model is MODEL and not machine.a.any()
+
+
+class OtherMachine(FurtherTrueMachine):
+    """A true machine of an extension whose method returns something else."""
+
+    kind: Literal["other"] = "other"
+    values: tuple[float, ...] | None = None
+
+    def true_machine(self, fitted: ErrorModel, lower: Corner, upper: Corner) -> TrueMachine:
+        return None if self.values is None else TrueMachine(fitted, np.array(self.values))  # type: ignore[return-value]
+
+
+@pytest.mark.parametrize("values", [None, (1e-6,), (float("nan"),) * 3])
+def test_a_machine_of_an_extension_has_a_value_for_each_parameter(values: Any) -> None:
+    model = build_error_model(MetricSettings(kind="metric", scale="split"), (0.0, 0.0), (1.0, 1.0))
+    settings = OtherMachine.model_construct(kind="other", values=values)
+    with pytest.raises(UnusableError, match="true_machine of OtherMachine"):
+        true_machine(settings, model, (0.0, 0.0), (1.0, 1.0))

@@ -16,14 +16,13 @@ from ballplate.simulator.experiment import (
     Position,
     ReadingGroup,
     lay_out,
-    with_chosen,
 )
 from ballplate.simulator.geometry import AXIS_NAMES
 from ballplate.simulator.inputs import ExperimentError, GivenText, hint, length_text
 from ballplate.simulator.machines import Array
 from ballplate.simulator.readings import named_rows, read_readings
 
-from ..planning import REST, SetUp, base_name, position_of, renamed
+from ..planning import REST, SetUp, base_name, position_of, renamed, with_chosen
 
 # What an experiment file says of the readings of a position.
 GROUP = ("probes", "balls", "repeats", "standard_uncertainty", "readings")

@@ -8,11 +8,11 @@ from importlib.metadata import version
 
 import numpy as np
 from ballplate.presentation import escaped
-from ballplate.simulator.experiment import Experiment, lay_out, with_chosen
+from ballplate.simulator.experiment import Experiment, lay_out
 from ballplate.simulator.geometry import ball_coordinates
 from ballplate.simulator.inputs import number_of
 
-from ..planning import RunSheet, Step, position_of, price, summary, times
+from ..planning import RunSheet, Step, position_of, price, summary, times, with_chosen
 from .reading_lists import sequence
 from .sheet_drawing import volume_drawing
 

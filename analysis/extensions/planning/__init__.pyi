@@ -1,6 +1,11 @@
 # Public names of this package, each loaded from its module when it is first used.
 from .campaign_choice import Request as Request, campaign as campaign
-from .constraints import HOUR as HOUR, Budget as Budget, Constraints as Constraints
+from .constraints import (
+    HOUR as HOUR,
+    Budget as Budget,
+    Constraints as Constraints,
+    with_chosen as with_chosen,
+)
 from .criteria import DESCRIPTIONS as DESCRIPTIONS, criterion as criterion
 from .information import Frames as Frames, pool_information as pool_information
 from .pools import seconds_of as seconds_of

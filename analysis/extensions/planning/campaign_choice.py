@@ -20,18 +20,11 @@ from ballplate.simulator.computing import (
     single_threaded,
     unreported,
 )
-from ballplate.simulator.experiment import (
-    AtMost,
-    Candidate,
-    Experiment,
-    Pool,
-    Position,
-    with_chosen,
-)
+from ballplate.simulator.experiment import AtMost, Candidate, Experiment, Pool, Position
 from ballplate.simulator.inputs import ExperimentError, listing, refused
 
 from .bound import Bound, bound
-from .constraints import Budget, Constraints, constraints
+from .constraints import Budget, Constraints, constraints, with_chosen
 from .criteria import CriterionName, criterion, is_about_balls, refuse_many_points
 from .information import pool_information
 from .remaining_candidates import Offer, offer, open_directions

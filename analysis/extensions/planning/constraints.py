@@ -8,7 +8,14 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from ballplate.simulator.experiment import AtMost, Candidate, ChangeTimes, Position
+from ballplate.simulator.experiment import (
+    AtMost,
+    Candidate,
+    ChangeTimes,
+    Experiment,
+    Position,
+    placed_only,
+)
 from ballplate.simulator.inputs import Flags, Integers, number_of
 from ballplate.simulator.machines import Array
 
@@ -245,4 +252,18 @@ def constraints(
         frozenset(done_indices),
         tuple(at_least),
         first,
+    )
+
+
+def with_chosen(experiment: Experiment, chosen: Sequence[Candidate]) -> Experiment:
+    """The experiment with chosen candidates, in their order, as its positions, and as further
+    calibration.
+    """
+    items = [candidate.item for candidate in chosen]
+    positions = tuple(item for item in items if isinstance(item, Position))
+    calibration = tuple(item for item in items if not isinstance(item, Position))
+    return placed_only(
+        replace(
+            experiment, positions=positions, calibration=(*experiment.calibration, *calibration)
+        )
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,14 +13,13 @@ from ballplate.results import (
     Prediction,
     Qualification,
     given_words,
-    of_pool,
     qualification_data,
     target_lines,
 )
-from ballplate.simulator.experiment import Candidate, Experiment, Pool, with_chosen
+from ballplate.simulator.experiment import Candidate, Experiment, Pool
 from ballplate.simulator.inputs import number_of, service
 
-from .constraints import HOUR, Budget, Spent
+from .constraints import HOUR, Budget, Spent, with_chosen
 from .criteria import DESCRIPTIONS, MAXIMUM, CriterionName
 from .experiment_file import experiment_text
 from .run_sheet_tables import sheet_data, sheet_lines
@@ -379,3 +378,21 @@ def _gain_data(gain: Gain) -> Data:
 
 def _names(candidates: Iterable[Any]) -> list[str]:
     return [candidate.name for candidate in candidates]
+
+
+# Reasons for which a candidate is not offered that are those of probes, by their first words.
+OF_PROBES = ("out of reach", "outside the volume")
+
+
+def of_pool(pool: Pool) -> Iterator[Qualification]:
+    """Yield the qualification of a choice from a pool some of whose candidates probes do not
+    reach.
+    """
+    reasons = [
+        f"{count} {reason}"
+        for reason, count in pool.dropped.items()
+        if reason.startswith(OF_PROBES)
+    ]
+    if reasons:
+        text = f"warning: candidates not offered: {'; '.join(reasons)}"
+        yield Qualification("reach", "the reach of the probes", text)

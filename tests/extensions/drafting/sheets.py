@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from ballplate.simulator.experiment.construction import with_chosen
+from ballplate.extensions.planning.constraints import with_chosen
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment, Position
 from ballplate.simulator.geometry.poses import ball_coordinates

@@ -11,7 +11,7 @@ import pytest
 from ballplate.cli import main
 from ballplate.extensions.drafting.data_sheet import data_sheet
 from ballplate.extensions.drafting.draft import draft
-from ballplate.simulator.experiment.construction import with_chosen
+from ballplate.extensions.planning.constraints import with_chosen
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.settings import build_error_model

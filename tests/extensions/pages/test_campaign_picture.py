@@ -10,11 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.extensions.campaign.campaign_picture import draw_curve
-from ballplate.extensions.planning.constraints import Budget, Spent
+from ballplate.extensions.planning.constraints import Budget, Spent, with_chosen
 from ballplate.extensions.planning.schedule import run_sheet
 from ballplate.extensions.planning.selection import Campaign, CurvePoint, Gain
 from ballplate.results.prediction import predict
-from ballplate.simulator.experiment.construction import with_chosen
 from ballplate.simulator.experiment.loading import load
 
 pytest.importorskip("matplotlib", reason="pictures need matplotlib")

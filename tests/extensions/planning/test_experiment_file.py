@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 from ballplate.extensions.campaign.sheet import sheet_of
+from ballplate.extensions.planning.constraints import with_chosen
 from ballplate.extensions.planning.experiment_file import experiment_text
 from ballplate.extensions.planning.schedule import run_sheet
 from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.experiment.construction import with_chosen
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Candidate, Experiment, Position

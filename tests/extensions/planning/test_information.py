@@ -10,14 +10,13 @@ import numpy as np
 import pytest
 import yaml
 from ballplate.extensions.planning.campaign_choice import Request, campaign
-from ballplate.extensions.planning.constraints import Budget, constraints
+from ballplate.extensions.planning.constraints import Budget, constraints, with_chosen
 from ballplate.extensions.planning.criteria import CriterionName, criterion, is_about_balls
 from ballplate.extensions.planning.information import pool_information
 from ballplate.extensions.planning.search import Losses, SelectionProblem, value
 from ballplate.results.prediction import Prediction, predict
 from ballplate.simulator.estimation.functions import displacements
 from ballplate.simulator.estimation.linearisation import linearise
-from ballplate.simulator.experiment.construction import with_chosen
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment, Position

@@ -13,12 +13,11 @@ import pytest
 from ballplate.cli import main
 from ballplate.extensions.campaign.positions_read import done_candidates
 from ballplate.extensions.planning.campaign_choice import Request, campaign
-from ballplate.extensions.planning.constraints import Budget
+from ballplate.extensions.planning.constraints import Budget, with_chosen
 from ballplate.extensions.planning.remaining_candidates import offer
 from ballplate.extensions.planning.schedule import run_sheet
 from ballplate.extensions.planning.selection import Campaign
 from ballplate.results.prediction import predict
-from ballplate.simulator.experiment.construction import with_chosen
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment, Position
 

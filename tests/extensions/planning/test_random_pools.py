@@ -13,14 +13,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.extensions.planning.campaign_choice import TINY_POOL
-from ballplate.extensions.planning.constraints import Spent
+from ballplate.extensions.planning.constraints import Spent, with_chosen
 from ballplate.extensions.planning.criteria import CriterionName
 from ballplate.extensions.planning.experiment_file import experiment_text
 from ballplate.extensions.planning.schedule import run_sheet
 from ballplate.extensions.planning.selection import Campaign
 from ballplate.results.prediction import planned_uncertainty, predict
 from ballplate.simulator.estimation.linearisation import linearise
-from ballplate.simulator.experiment.construction import with_chosen
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Candidate, Experiment, Position
