@@ -25,11 +25,7 @@ from ballplate.simulator.inputs.arguments import (
 from ballplate.simulator.inputs.extensions import service
 
 from .arguments import SIGMAS, PathLike, experiment_of, load, observed_of
-from .results.estimator_choice import (
-    ESTIMATORS,
-    EstimatorName,
-    takers,
-)
+from .results.estimator_choice import ESTIMATORS, EstimatorName, takers
 from .simulator.experiment.model import Experiment
 
 if TYPE_CHECKING:

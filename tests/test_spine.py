@@ -20,28 +20,46 @@ MOST_MODULES, MOST_NODES = 130, 140_000
 # Calls from one folder into another while the quickstart is loaded.
 MOST_MOVES = 90
 
-# Code objects are kept by their first line, which is that of the first decorator.
-ENTERED = """
-import contextlib, io, json, sys
-entered = set()
+# Calls are kept by file and first line, which is that of the first decorator.
+FOLLOWED = """
+import contextlib, io, json, sys, ballplate as bp
+from ballplate.cli import main
+calls, quickstart = [], "designs/quickstart.yaml"
 
 def follow(frame, event, argument):
-    if event == "call":
-        entered.add((frame.f_code.co_filename, frame.f_code.co_firstlineno))
+    code = frame.f_code
+    if event == "call" and code.co_name != "<module>":
+        calls.append((code.co_filename, code.co_firstlineno))
 
-import ballplate as bp
-from ballplate.cli import main
+def end(found):
+    sys.setprofile(None)
+    files = [getattr(module, "__file__", None) for module in list(sys.modules.values())]
+    json.dump([found, [file for file in files if file]], sys.__stdout__)
 
-quickstart, readings = "designs/quickstart.yaml", sys.argv[1]
-bp.simulate(bp.quickstart()).to_csv(readings, index=False)
 with contextlib.redirect_stdout(io.StringIO()):
+"""
+CHECK = "    assert main(['check', quickstart]) == 0\nend([])"
+LOAD = "    bp.quickstart()\n    sys.setprofile(follow)\n    bp.load(quickstart)\nend(calls)"
+ALL = """    bp.simulate(bp.quickstart()).to_csv(sys.argv[1], index=False)
     sys.setprofile(follow)
     assert main(["check", quickstart]) == main(["run", quickstart]) == 0
-    assert main(["fit", quickstart, readings]) == 0
-    sys.setprofile(None)
-loaded = [getattr(module, "__file__", None) for module in list(sys.modules.values())]
-json.dump([sorted(entered), [file for file in loaded if file]], sys.stdout)
-"""
+    assert main(["fit", quickstart, sys.argv[1]]) == 0
+end(sorted(set(calls)))"""
+
+
+def followed(code: str, *arguments: str) -> tuple[list[tuple[str, int]], list[str]]:
+    """Calls, and files of modules that are loaded, by path from the top; empty of others."""
+
+    def name_of(file: str) -> str:
+        path = Path(file)
+        is_own = path.is_relative_to(TOP) and "site-packages" not in path.parts
+        return path.relative_to(TOP).as_posix() if is_own else ""
+
+    command = [sys.executable, "-c", FOLLOWED + code, *arguments]
+    done = subprocess.run(command, cwd=TOP, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    calls, files = json.loads(done.stdout)
+    return [(name_of(file), line) for file, line in calls], [*filter(None, map(name_of, files))]
 
 
 def listed(path: str, bullet: str) -> list[str]:
@@ -49,97 +67,41 @@ def listed(path: str, bullet: str) -> list[str]:
     return re.findall(rf"(?m)^{bullet} `((?:simulator|analysis)/\S+\.py)`", text)
 
 
-def name_of(file: str) -> str:
-    """Path of a module of the checkout from its top; empty of others."""
-    path = Path(file)
-    is_own = path.is_relative_to(TOP) and "site-packages" not in path.parts
-    return path.relative_to(TOP).as_posix() if is_own else ""
-
-
-def nodes(path: Path, lines: set[int]) -> int:
+def nodes(name: str, lines: set[int]) -> int:
     """Nodes of the functions of a file that begin at one of the lines, inner ones once."""
 
     def below(node: ast.AST) -> int:
         count = 0
         for child in ast.iter_child_nodes(node):
-            first = getattr(child, "lineno", 0)
-            first = min([first, *(d.lineno for d in getattr(child, "decorator_list", ()))])
-            is_entered = isinstance(child, ast.FunctionDef) and first in lines
+            starts = [getattr(child, "lineno", 0)]
+            starts += [decorator.lineno for decorator in getattr(child, "decorator_list", ())]
+            is_entered = isinstance(child, ast.FunctionDef) and min(starts) in lines
             count += sum(1 for _ in ast.walk(child)) if is_entered else below(child)
         return count
 
-    return below(ast.parse(path.read_text(encoding="utf-8")))
+    return below(ast.parse((TOP / name).read_text(encoding="utf-8")))
 
 
 def test_the_spine_is_what_commands_enter(tmp_path: Path) -> None:
     spine = listed("docs/explanation/core.md", r"\d+\.")
     assert 0 < len(spine) == len(set(spine)) <= MOST_FILES
-    lines_of = [len((TOP / name).read_text(encoding="utf-8").splitlines()) for name in spine]
-    assert sum(lines_of) <= MOST_LINES
+    assert sum(len((TOP / name).read_bytes().splitlines()) for name in spine) <= MOST_LINES
     assert listed("CONTRIBUTING.md", "  -") == spine
-    command = [sys.executable, "-c", ENTERED, str(tmp_path / "readings.csv")]
-    done = subprocess.run(command, cwd=TOP, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    functions, loaded = json.loads(done.stdout)
-    lines: dict[str, set[int]] = {name_of(file): set() for file in loaded}
-    for file, line in functions:
-        lines.setdefault(name_of(file), set()).add(line)
-    kernel = {name for name in lines if re.match("simulator/|analysis/(?!extensions/.*/)", name)}
-    entered = {name: nodes(TOP / name, lines[name]) for name in kernel}
-    assert set(spine) <= set(lines)
+    calls, files = followed(ALL, str(tmp_path / "readings.csv"))
+    assert set(spine) <= set(files)
+    kernel = {name for name, _ in calls if re.match("simulator/|analysis/(?!extensions/.*/)", name)}
+    entered = {name: nodes(name, {line for n, line in calls if n == name}) for name in kernel}
     assert sum(entered.get(name, 0) for name in spine) >= LEAST_SHARE * sum(entered.values())
 
 
-LOADED = """
-import contextlib, io, json, sys
-from ballplate.cli import main
-
-with contextlib.redirect_stdout(io.StringIO()):
-    assert main(["check", "designs/quickstart.yaml"]) == 0
-modules = [m for name, m in sys.modules.items() if name.split(".")[0] == "ballplate"]
-json.dump([m.__file__ for m in modules if getattr(m, "__file__", None)], sys.stdout)
-"""
-
-MOVES = """
-import sys
-from pathlib import Path
-import ballplate as bp
-
-top, rooms, moves = Path.cwd(), {}, []
-
-def room_of(name):
-    path = Path(name)
-    if not path.is_relative_to(top) or "site-packages" in path.parts:
-        return None
-    return path.relative_to(top).parts[:2]
-
-def follow(frame, event, argument):
-    name = frame.f_code.co_filename
-    room = rooms.setdefault(name, room_of(name))
-    if event == "call" and room and frame.f_code.co_name != "<module>":
-        if moves[-1:] != [room]:
-            moves.append(room)
-
-bp.quickstart()
-sys.setprofile(follow)
-bp.load("designs/quickstart.yaml")
-sys.setprofile(None)
-print(len(moves))
-"""
-
-
-def printed(code: str) -> str:
-    done = subprocess.run([sys.executable, "-c", code], cwd=TOP, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
-
-
 def test_check_loads_few_modules() -> None:
-    files = [Path(name) for name in json.loads(printed(LOADED))]
-    trees = [ast.parse(path.read_text(encoding="utf-8")) for path in files]
+    _, files = followed(CHECK)
+    trees = [ast.parse((TOP / name).read_text(encoding="utf-8")) for name in files]
     assert 0 < len(files) <= MOST_MODULES
     assert sum(1 for tree in trees for _ in ast.walk(tree)) <= MOST_NODES
 
 
 def test_loading_goes_down_and_not_up_and_down() -> None:
-    assert 0 < int(printed(MOVES)) <= MOST_MOVES
+    rooms = [Path(name).parts[:2] for name, _ in followed(LOAD)[0] if name]
+    moves = sum(1 for before, after in zip(rooms, rooms[1:], strict=False) if before != after)
+    assert 0 < moves < MOST_MOVES

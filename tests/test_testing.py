@@ -12,12 +12,7 @@ from ballplate.simulator.design.observations.distances import CalibratedDistance
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.kinematic import kinematic_model
 from ballplate.simulator.machines.metric import MetricModel
-from ballplate.testing import (
-    check_ball_functions,
-    check_influence,
-    check_model,
-    check_observations,
-)
+from ballplate.testing import check_ball_functions, check_influence, check_model, check_observations
 
 from tests.extensions.influences.test_influence_checks import Long
 from tests.extensions.own_models.test_python_values import module

@@ -7,22 +7,10 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ballplate.results.estimator_choice import (
-    DRAWN,
-    ESTIMATORS,
-    TAKE,
-    fit_readings,
-    takers,
-)
+from ballplate.results.estimator_choice import DRAWN, ESTIMATORS, TAKE, fit_readings, takers
 from ballplate.simulator.inputs.extensions import service
 
-from .common import (
-    add_json,
-    add_page,
-    add_picture,
-    day,
-    map_path,
-)
+from .common import add_json, add_page, add_picture, day, map_path
 from .notes import note_singular_values, warn
 from .outputs import UsageError, add_force, add_output, write
 from .reading_options import add_pairs, add_readings, observed_readings, warn_of

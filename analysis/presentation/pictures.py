@@ -10,14 +10,7 @@ from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.inputs.number_arrays import Array
 
 from .scenes import Box, DrawnPosition, names_fit, scene
-from .svg import (
-    INK,
-    MUTED,
-    PAPER,
-    blank_axes,
-    drawing,
-    save,
-)
+from .svg import INK, MUTED, PAPER, blank_axes, drawing, save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -11,10 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from ballplate.presentation.formatting import (
-    Data,
-    by_name,
-)
+from ballplate.presentation.formatting import Data, by_name
 from ballplate.simulator.inputs.number_arrays import Array
 from ballplate.simulator.inputs.settings import number_of
 from ballplate.simulator.machines.arrangement import (

@@ -27,13 +27,9 @@ from .estimates import (
     labels,
     probe_places,
 )
-from .extension_results import (
-    IssuedCertificate,
-)
+from .extension_results import IssuedCertificate
 from .prediction import by_label
-from .residuals import (
-    reading_residuals,
-)
+from .residuals import reading_residuals
 
 if TYPE_CHECKING:
     import pandas

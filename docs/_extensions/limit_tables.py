@@ -15,13 +15,7 @@ from ballplate.extensions.splines import error_curve, read_points
 from ballplate.extensions.sweeps import axes, bundle, load, sweep_settings
 from ballplate.montecarlo import experiments
 from ballplate.simulator.design.observations import calibration, joint_values
-from ballplate.simulator.experiment import (
-    _priors,
-    changes,
-    references,
-    sections,
-    size_checks,
-)
+from ballplate.simulator.experiment import _priors, changes, references, sections, size_checks
 from ballplate.simulator.experiment._artefacts import MOST_BALLS, MOST_BALLS_OF_ALL
 from ballplate.simulator.geometry.artefacts import MOST_DIRECTIONS
 from ballplate.simulator.inputs import decoding, messages, settings, tables, yamltree

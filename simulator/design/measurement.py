@@ -11,9 +11,7 @@ from ballplate.simulator.inputs.number_arrays import Array
 
 from .arrays import Design
 from .influence_quantities import Disturbed, Influence
-from .objects import (
-    Readings,
-)
+from .objects import Readings
 from .state import State
 
 

@@ -21,9 +21,7 @@ from ballplate.simulator.inputs.number_arrays import Array, Integers
 from ballplate.simulator.inputs.quantities import Target
 from ballplate.simulator.machines.protocol import Unit
 
-from .covariance import (
-    MICROMETRE,
-)
+from .covariance import MICROMETRE
 from .linearisation import LinearFunctions, Linearisation
 
 

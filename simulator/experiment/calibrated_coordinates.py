@@ -6,9 +6,7 @@ from collections.abc import Sequence
 from typing import Literal, get_args
 
 import numpy as np
-from ballplate.simulator.design.observations.calibration import (
-    MOST_TIED_BALLS,
-)
+from ballplate.simulator.design.observations.calibration import MOST_TIED_BALLS
 from ballplate.simulator.design.observations.coordinates import CoordinateCalibration, far_spread
 from ballplate.simulator.geometry.ball_layouts import BallLayout, BallNames, frozen
 from ballplate.simulator.geometry.motions import AXIS_NAMES

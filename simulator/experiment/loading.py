@@ -19,14 +19,7 @@ from ballplate.simulator.inputs.decoding import refuse_long_lines
 from ballplate.simulator.inputs.messages import ExperimentError, Message
 from ballplate.simulator.inputs.problems import Problems, in_order
 from ballplate.simulator.inputs.trust import OPENED, Trust
-from ballplate.simulator.inputs.yamltree import (
-    Mapping,
-    Mark,
-    Node,
-    mark_of,
-    parse_tree,
-    read_text,
-)
+from ballplate.simulator.inputs.yamltree import Mapping, Mark, Node, mark_of, parse_tree, read_text
 
 from ._resolution import resolve
 from .changes import MOST_OF_ALL, in_variants, node_of, variant_trees

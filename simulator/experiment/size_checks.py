@@ -12,9 +12,7 @@ from ballplate.simulator.geometry.artefacts import BryanGaugeSettings
 from ballplate.simulator.geometry.motions import pose_size
 from ballplate.simulator.inputs.messages import Steps
 from ballplate.simulator.inputs.number_arrays import Indices
-from ballplate.simulator.machines.settings import (
-    build_error_model,
-)
+from ballplate.simulator.machines.settings import build_error_model
 
 from .model import Evaluation, Position, Probe
 from .references import References

@@ -16,9 +16,7 @@ from ballplate.simulator.machines._empirical import empirical_model
 from ballplate.simulator.machines._terms import sums
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
 from ballplate.simulator.machines.bases import Polynomial
-from ballplate.simulator.machines.kinematic import (
-    kinematic_model,
-)
+from ballplate.simulator.machines.kinematic import kinematic_model
 from ballplate.simulator.machines.metric import MetricModel, SpatialMetricModel
 from ballplate.simulator.machines.protocol import ErrorModel
 from ballplate.simulator.machines.truth import CoefficientSettings, TruthError, true_parameters

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ballplate.arguments import (
-    PathLike,
-    experiment_of,
-)
+from ballplate.arguments import PathLike, experiment_of
 from ballplate.simulator.experiment import Experiment
 
 if TYPE_CHECKING:

@@ -10,13 +10,7 @@ from pathlib import Path
 
 import numpy as np
 from ballplate.simulator.design import Design
-from ballplate.simulator.experiment import (
-    Candidate,
-    Experiment,
-    Position,
-    ReadingGroup,
-    lay_out,
-)
+from ballplate.simulator.experiment import Candidate, Experiment, Position, ReadingGroup, lay_out
 from ballplate.simulator.geometry import AXIS_NAMES
 from ballplate.simulator.inputs import ExperimentError, GivenText, hint, length_text
 from ballplate.simulator.machines import Array

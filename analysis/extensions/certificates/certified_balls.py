@@ -7,15 +7,7 @@ from dataclasses import dataclass
 from importlib.metadata import version
 
 import numpy as np
-from ballplate.presentation import (
-    Data,
-    MainTable,
-    Result,
-    aligned,
-    number,
-    picked,
-    to_uncertainty,
-)
+from ballplate.presentation import Data, MainTable, Result, aligned, number, picked, to_uncertainty
 from ballplate.results import freedom_words
 from ballplate.simulator.inputs import listing
 from ballplate.simulator.machines import Array

@@ -5,13 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from ballplate.results import (
-    CheckedDesign,
-    CheckedFile,
-    scale_lines,
-    target_lines,
-    verdict_lines,
-)
+from ballplate.results import CheckedDesign, CheckedFile, scale_lines, target_lines, verdict_lines
 from ballplate.simulator.inputs import in_lines, in_one_line
 
 

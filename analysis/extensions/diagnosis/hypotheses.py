@@ -7,19 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from ballplate.extensions.influences import (
-    Drift,
-    Sag,
-    SagSettings,
-    SharedDisplacements,
-    even_clock,
-)
-from ballplate.simulator.design import (
-    Design,
-    State,
-    disturbed_readings,
-    expected_readings,
-)
+from ballplate.extensions.influences import Drift, Sag, SagSettings, SharedDisplacements, even_clock
+from ballplate.simulator.design import Design, State, disturbed_readings, expected_readings
 from ballplate.simulator.geometry import AXIS_NAMES
 from ballplate.simulator.machines import (
     ARRANGEMENTS,

@@ -4,15 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 
-from ballplate.cli import (
-    UsageError,
-    add_file,
-    add_force,
-    add_json,
-    add_output,
-    number,
-    write,
-)
+from ballplate.cli import UsageError, add_file, add_force, add_json, add_output, number, write
 
 DESCRIPTION = (
     "Compute the redundancy of every observation of a design, the smallest biases of"

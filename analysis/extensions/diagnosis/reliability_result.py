@@ -8,15 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from ballplate.presentation import (
-    SHOWN,
-    Data,
-    Result,
-    aligned,
-    number,
-    picked,
-    table_lines,
-)
+from ballplate.presentation import SHOWN, Data, Result, aligned, number, picked, table_lines
 from ballplate.simulator.computing import comparable
 from ballplate.simulator.design import Design
 from ballplate.simulator.estimation import Coordinates, Functions, Parameters

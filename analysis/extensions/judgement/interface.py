@@ -4,12 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal
 
-from ballplate.arguments import (
-    SIGMAS,
-    PathLike,
-    experiment_of,
-    observed_of,
-)
+from ballplate.arguments import SIGMAS, PathLike, experiment_of, observed_of
 from ballplate.simulator.computing import Report, unreported
 from ballplate.simulator.experiment import Experiment
 from ballplate.simulator.inputs import ensure_one_of, ensure_report, ensure_whole

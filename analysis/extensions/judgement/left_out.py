@@ -21,13 +21,7 @@ from ballplate.simulator.computing import (
     single_threaded,
     unreported,
 )
-from ballplate.simulator.design import (
-    Design,
-    Flags,
-    Lengths,
-    measured,
-    reading_uncertainties,
-)
+from ballplate.simulator.design import Design, Flags, Lengths, measured, reading_uncertainties
 from ballplate.simulator.estimation import (
     Distances,
     Linearisation,

@@ -7,10 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from ballplate.arguments import (
-    PathLike,
-    experiment_of,
-)
+from ballplate.arguments import PathLike, experiment_of
 from ballplate.simulator.experiment import Experiment
 from ballplate.simulator.inputs import ensure_one_of, ensure_path, ensure_type
 

@@ -20,14 +20,7 @@ from ballplate.simulator.inputs import (
     refused,
 )
 from ballplate.simulator.machines import Array
-from ballplate.simulator.readings import (
-    Source,
-    SourceRows,
-    SourceText,
-    Units,
-    is_plain,
-    plain_rows,
-)
+from ballplate.simulator.readings import Source, SourceRows, SourceText, Units, is_plain, plain_rows
 
 from .any_table import AskedError, TableRows, read_any_table
 from .clock_times import wrong_times

@@ -11,10 +11,7 @@ from dataclasses import dataclass, replace
 from itertools import chain, combinations
 
 import numpy as np
-from ballplate.simulator.design import (
-    Design,
-    Priors,
-)
+from ballplate.simulator.design import Design, Priors
 from ballplate.simulator.geometry import AXIS_NAMES
 from ballplate.simulator.inputs import listing
 from ballplate.simulator.machines import Array

@@ -16,12 +16,7 @@ from ballplate.simulator.machines import (
 )
 from pydantic import Field, PrivateAttr
 
-from .description import (
-    MachineDescription,
-    fitted_in_plane,
-    fitted_volumetric,
-    true_volumetric,
-)
+from .description import MachineDescription, fitted_in_plane, fitted_volumetric, true_volumetric
 from .machine_file import load_machine
 
 

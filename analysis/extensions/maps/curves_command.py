@@ -6,14 +6,7 @@ from argparse import ArgumentParser, ArgumentTypeError, Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ballplate.cli import (
-    UsageError,
-    add_formats,
-    complain,
-    count,
-    print_json,
-    print_lines,
-)
+from ballplate.cli import UsageError, add_formats, complain, count, print_json, print_lines
 
 from .fitted_argument import FITTED, fitted_map
 

@@ -7,11 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from ballplate.simulator.design import Tasks
 from ballplate.simulator.experiment import Experiment
-from ballplate.simulator.inputs import (
-    hint,
-    listing,
-    refused,
-)
+from ballplate.simulator.inputs import hint, listing, refused
 
 from ..machine_files import FittedMap
 from .point_files import GivenPoints

@@ -5,10 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ballplate.arguments import (
-    PathLike,
-    experiment_of,
-)
+from ballplate.arguments import PathLike, experiment_of
 from ballplate.simulator.computing import Report, unreported
 from ballplate.simulator.experiment import Experiment
 from ballplate.simulator.inputs import ensure_path, ensure_report

@@ -10,13 +10,7 @@ from itertools import product
 
 import numpy as np
 from ballplate.simulator.computing import svd
-from ballplate.simulator.experiment import (
-    Experiment,
-    Position,
-    Probe,
-    ReadingGroup,
-    placed_only,
-)
+from ballplate.simulator.experiment import Experiment, Position, Probe, ReadingGroup, placed_only
 from ballplate.simulator.geometry import (
     AXIS_INDEX,
     QUARTER_TURNS,
@@ -31,14 +25,7 @@ from ballplate.simulator.machines import Array
 
 from ..planning import seconds_of
 from .certificates import certificates
-from .changes import (
-    Change,
-    ChangeKind,
-    free_name,
-    is_possible,
-    middle_of,
-    scale_readings,
-)
+from .changes import Change, ChangeKind, free_name, is_possible, middle_of, scale_readings
 from .written import cleaned, plane_of
 
 PLANES: tuple[Axis, ...] = ("x", "y", "z")

@@ -4,11 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from ballplate.arguments import (
-    PathLike,
-    load,
-    load_all,
-)
+from ballplate.arguments import PathLike, load, load_all
 from ballplate.simulator.inputs import ensure_path, read_text
 
 

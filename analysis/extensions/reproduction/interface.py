@@ -6,9 +6,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from ballplate.arguments import (
-    PathLike,
-)
+from ballplate.arguments import PathLike
 from ballplate.simulator.computing import Report, unreported
 from ballplate.simulator.inputs import ensure_report, ensure_whole
 

@@ -5,10 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, get_args
 
-from ballplate.arguments import (
-    PathLike,
-    experiment_of,
-)
+from ballplate.arguments import PathLike, experiment_of
 from ballplate.simulator.computing import Report, unreported
 from ballplate.simulator.experiment import Experiment, with_pool
 from ballplate.simulator.inputs import (

@@ -18,11 +18,7 @@ from ballplate.extensions.repair.changes import (
     with_added,
     with_position,
 )
-from ballplate.extensions.repair.mending import (
-    changes_of,
-    with_experiment,
-    with_text_changes,
-)
+from ballplate.extensions.repair.mending import changes_of, with_experiment, with_text_changes
 from ballplate.extensions.repair.written import Edit, edits
 from ballplate.extensions.repair.yamltext import TextChange
 from ballplate.simulator.computing import comparable

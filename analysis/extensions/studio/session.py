@@ -12,11 +12,7 @@ from threading import RLock
 from typing import Any
 
 from ballplate.presentation import Data, as_data
-from ballplate.simulator.inputs import (
-    ExperimentError,
-    format_path,
-    service,
-)
+from ballplate.simulator.inputs import ExperimentError, format_path, service
 
 from .actions import ActionError, done
 from .document import (

@@ -3,14 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from ballplate.extensions.pages.interface import (
-    Chart,
-    Html,
-    Trace,
-    chart_svg,
-    figure,
-    legend,
-)
+from ballplate.extensions.pages.interface import Chart, Html, Trace, chart_svg, figure, legend
 from ballplate.simulator.inputs import number_of
 from ballplate.simulator.machines import Array, Integers
 from ballplate.uncertainty import DESCRIPTIONS

@@ -12,12 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ballplate.simulator.computing import Report, unreported
-from ballplate.simulator.inputs import (
-    ensure_path,
-    ensure_report,
-    ensure_type,
-    ensure_whole,
-)
+from ballplate.simulator.inputs import ensure_path, ensure_report, ensure_type, ensure_whole
 
 if TYPE_CHECKING:
     from .result import SweepResult

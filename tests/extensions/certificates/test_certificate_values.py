@@ -12,10 +12,7 @@ import numpy as np
 import pytest
 import yaml
 from ballplate.cli import main
-from ballplate.extensions.certificates.certificate_files import (
-    certified_values,
-    read_certificate,
-)
+from ballplate.extensions.certificates.certificate_files import certified_values, read_certificate
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.gauss_newton import estimate
 from ballplate.simulator.experiment.layout import lay_out

@@ -13,10 +13,7 @@ from ballplate import experiment as made_of, fit, simulate
 from ballplate.cli import main
 from ballplate.extensions.estimators import distances
 from ballplate.extensions.estimators.alternative_estimators import AlternativeName
-from ballplate.extensions.estimators.distances import (
-    compare_estimators,
-    count_terms,
-)
+from ballplate.extensions.estimators.distances import compare_estimators, count_terms
 from ballplate.simulator.experiment.layout import lay_out
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError

@@ -21,12 +21,7 @@ from ballplate.simulator.readings.reading_files import read_readings, write_read
 from ballplate.simulator.readings.simulated import simulated_readings
 
 from tests.extensions.influences import wording
-from tests.extensions.influences.campaigns import (
-    Real,
-    dense_spread,
-    file_with,
-    told_on_page,
-)
+from tests.extensions.influences.campaigns import Real, dense_spread, file_with, told_on_page
 from tests.reference import dense
 
 # Seconds: set-up, reading, change of probe.

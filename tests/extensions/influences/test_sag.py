@@ -21,10 +21,7 @@ from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.experiment.model import Experiment
 from ballplate.simulator.inputs.messages import ExperimentError
 
-from tests.extensions.influences.campaigns import (
-    Real,
-    file_with,
-)
+from tests.extensions.influences.campaigns import Real, file_with
 
 SAG = 2e-6
 SPREAD = np.array([SAG])

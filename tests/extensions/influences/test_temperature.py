@@ -27,11 +27,7 @@ from ballplate.simulator.readings.simulated import simulated_readings
 from ballplate.uncertainty.quantities import QUANTITIES
 
 from tests.extensions.influences import wording
-from tests.extensions.influences.campaigns import (
-    dense_spread,
-    file_with,
-    nominal_arms,
-)
+from tests.extensions.influences.campaigns import dense_spread, file_with, nominal_arms
 
 TOP = Path(__file__).parents[3]
 

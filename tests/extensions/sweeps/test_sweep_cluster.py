@@ -24,14 +24,7 @@ from ballplate.extensions.sweeps.cluster import ClusterError, OtherVersionError,
 from ballplate.extensions.sweeps.task import CellTask
 
 from tests.extensions.sweeps import wording
-from tests.extensions.sweeps.support import (
-    ROOT,
-    assert_same,
-    command,
-    rows,
-    small_sweep,
-    stored,
-)
+from tests.extensions.sweeps.support import ROOT, assert_same, command, rows, small_sweep, stored
 
 Start = Callable[..., subprocess.Popen[bytes]]
 

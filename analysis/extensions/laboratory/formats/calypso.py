@@ -14,16 +14,7 @@ from fractions import Fraction
 from ballplate.simulator.inputs import LENGTH_UNITS, Mark, shorten
 
 from .columns import agrees, headings, is_number, with_point
-from .report import (
-    AXES,
-    UNSTATED,
-    Feature,
-    Format,
-    Located,
-    Report,
-    ReportProblems,
-    System,
-)
+from .report import AXES, UNSTATED, Feature, Format, Located, Report, ReportProblems, System
 from .runs import runs_of
 from .text import Text, read_lines
 

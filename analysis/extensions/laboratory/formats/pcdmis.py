@@ -15,17 +15,7 @@ from itertools import takewhile
 from ballplate.simulator.inputs import LENGTH_UNITS, Mark, shorten
 
 from .columns import agrees, is_number, with_point
-from .report import (
-    AXES,
-    CIRCLE,
-    SPHERE,
-    UNSTATED,
-    Feature,
-    Format,
-    Located,
-    Report,
-    ReportProblems,
-)
+from .report import AXES, CIRCLE, SPHERE, UNSTATED, Feature, Format, Located, Report, ReportProblems
 from .runs import OF_RUNS
 from .text import Text, read_lines
 

@@ -13,12 +13,7 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
-from ballplate.simulator.inputs import (
-    QuantityError,
-    exact_number,
-    refused,
-    shorten,
-)
+from ballplate.simulator.inputs import QuantityError, exact_number, refused, shorten
 from ballplate.simulator.machines import Array
 
 from ..xmltree import Element, parse_xml

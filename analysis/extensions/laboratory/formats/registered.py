@@ -5,13 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 from pathlib import Path
 
-from ballplate.simulator.inputs import (
-    GivenText,
-    listing,
-    read_bytes,
-    refused,
-    text_and_encoding,
-)
+from ballplate.simulator.inputs import GivenText, listing, read_bytes, refused, text_and_encoding
 
 from .calypso import CALYPSO
 from .dmis import DMIS
