@@ -2,7 +2,6 @@
 from .common import (
     add_file as add_file,
     add_formats as add_formats,
-    add_goal as add_goal,
     add_json as add_json,
     add_picture as add_picture,
     add_workers as add_workers,
@@ -15,6 +14,7 @@ from .common import (
     grid as grid,
     number as number,
     page_path as page_path,
+    percentage as percentage,
     print_json as print_json,
     print_lines as print_lines,
     show as show,

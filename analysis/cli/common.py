@@ -54,29 +54,6 @@ def add_json(parser: ArgumentParser) -> None:
     )
 
 
-def add_goal(parser: ArgumentParser, quantities: str) -> None:
-    """Add the goal, with examples of quantities, and the replacement of the target."""
-    parser.add_argument(
-        "--goal",
-        default="lengths",
-        help=(
-            "lengths (default: distances between corrected points, U6, within target_uncertainty),"
-            f" tasks, or a quantity such as {quantities}"
-        ),
-    )
-    parser.add_argument(
-        "--share",
-        metavar="95%",
-        type=percentage,
-        help="share of the lengths that must be within the target; default: all",
-    )
-    parser.add_argument(
-        "--target",
-        metavar="LENGTH",
-        help='target instead of target_uncertainty, such as "0.5 um + L/1000000"',
-    )
-
-
 T = TypeVar("T")
 
 

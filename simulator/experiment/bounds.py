@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -25,6 +25,9 @@ from .references import References
 from .validation import Sections
 
 TOLERANCE = 1e-9
+
+# Positions whose balls are placed together: of the largest artefacts these are 64 MB.
+AT_ONCE = 64
 
 # Why a place cannot be taken.
 OUTSIDE, EDGE = "outside the volume", "edge outside the volume"
@@ -205,10 +208,19 @@ def check_inside(
     Balls may be outside, and scale readings by a thousandth of the volume.
     """
     layouts = [references.layouts[position.artefact] for position in positions.values()]
-    balls = balls_in_machine([position.pose for position in positions.values()], layouts)
+    balls = balls_of([position.pose for position in positions.values()], layouts)
     for (steps, position), layout, places in zip(positions.items(), layouts, balls, strict=True):
         if text := _outside(position, layout, places, volume, probes):
             references.problems.add(steps, text)
+
+
+def balls_of(poses: Sequence[Pose], layouts: Sequence[BallLayout]) -> Iterator[Array]:
+    """Yield the balls (n, d) of each pose in the machine, of few at once: there may be hundreds of
+    thousands, of which few are read.
+    """
+    for start in range(0, len(poses), AT_ONCE):
+        block = slice(start, start + AT_ONCE)
+        yield from balls_in_machine(poses[block], layouts[block])
 
 
 def _outside(

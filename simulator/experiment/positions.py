@@ -15,7 +15,6 @@ from ballplate.simulator.geometry.poses import (
     FreePlacement,
     PlanePlacement,
     Pose,
-    balls_in_machine,
     nominal_poses,
     room_parts,
     shifted,
@@ -24,7 +23,7 @@ from ballplate.simulator.inputs.messages import Steps
 from ballplate.simulator.inputs.number_arrays import Array
 from ballplate.simulator.inputs.quantity_types import Place
 
-from .bounds import Bounds, edge_of, length_of, limits_of, shared
+from .bounds import Bounds, balls_of, edge_of, length_of, limits_of, shared
 from .model import Position, ReadingGroup
 from .position_sections import PositionSettings, ReadingSettings
 from .references import References, lengths_per_axis
@@ -65,7 +64,7 @@ def resolve_positions(
     poses = nominal_poses([(draft.placement, draft.layout) for draft in placed], d)
     rooms, lengths = [np.zeros((2, d))] * len(placed), [dict[str, float]()] * len(placed)
     if bounds is not None:
-        balls = balls_in_machine(poses, [draft.layout for draft in placed])
+        balls = balls_of(poses, [draft.layout for draft in placed])
         rooms = [
             _room(draft, pose, places, bounds, references)
             for draft, pose, places in zip(placed, poses, balls, strict=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from typing import Annotated, Any
@@ -151,14 +151,24 @@ def validate_sections(root: Node, problems: Problems, planning: bool = False) ->
         problems.add((), other_kind)
         return Sections()
     problems.add_empty()
-    parts = [*_parts_of_extensions(root, problems), *_parts_of_kernel(root, problems, planning)]
+    # A key that is misspelt is not reported as missing, too, and gets no default.
+    misspelt = {
+        nearest(key, _absent(root))
+        for key in root.items
+        if key not in ExperimentSettings.model_fields and not _is_provided(key)
+    }
+    parts = [
+        *_parts_of_extensions(root, problems),
+        *_parts_of_kernel(root, misspelt, problems, planning),
+    ]
     values = validated_parts(parts, problems)
     # Only keys that are not written get their defaults. A section that is written and invalid stays
     # None, so that nothing is computed with a default in its place.
     sections: dict[str, Any] = {
         key: section.get_default(call_default_factory=True)  # type: ignore[call-arg,unused-ignore]
         for key, section in ExperimentSettings.model_fields.items()
-        if key not in (*ENTRIES, "pool", "variants", *root.items) and not section.is_required()
+        if key not in (*ENTRIES, "pool", "variants", *root.items, *misspelt)
+        and not section.is_required()
     }
     sections |= {key: {} for key in (*ENTRIES, "own")}
     for steps, value in values.items():
@@ -189,14 +199,10 @@ def _parts_of_extensions(root: MappingNode, problems: Problems) -> Iterator[Part
             yield (key,), settings, node
 
 
-def _parts_of_kernel(root: MappingNode, problems: Problems, planning: bool) -> Iterator[Part]:
+def _parts_of_kernel(
+    root: MappingNode, misspelt: Collection[str | None], problems: Problems, planning: bool
+) -> Iterator[Part]:
     """Sections, and entries of those that are validated one by one; missing ones are reported."""
-    # A key that is misspelt is not reported as missing, too.
-    misspelt = {
-        nearest(key, _absent(root))
-        for key in root.items
-        if key not in ExperimentSettings.model_fields and not _is_provided(key)
-    }
     for key, section in ExperimentSettings.model_fields.items():
         node = root.items.get(key)
         if node is None and key in misspelt:

@@ -138,13 +138,12 @@ def _of_extension(
     :raises UnusableError: it is none, or has not one finite value for each parameter of its model.
     """
     machine = settings.true_machine(fitted, lower, upper)
-    where = f"true_machine of {type(settings).__name__}"
-    if not isinstance(machine, TrueMachine):
-        raise UnusableError(f"{where} returns {machine!r}, and no TrueMachine")
-    count = len(machine.model.parameters)
-    if np.shape(machine.a) != (count,) or not np.isfinite(machine.a).all():
-        raise UnusableError(f"{where} needs {count} finite values a, one for each parameter")
-    return machine
+    if isinstance(machine, TrueMachine):
+        is_complete = np.shape(machine.a) == (len(machine.model.parameters),)
+        if is_complete and np.isfinite(machine.a).all():
+            return machine
+    text = "returns no TrueMachine with a finite value for each parameter of its model"
+    raise UnusableError(f"true_machine of {type(settings).__name__} {text}")
 
 
 def true_parameters(settings: Settings, model: ErrorModel) -> Array:

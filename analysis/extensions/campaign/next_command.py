@@ -7,7 +7,6 @@ from argparse import ArgumentParser, Namespace
 from ballplate.cli import (
     UsageError,
     add_file,
-    add_goal,
     add_json,
     add_readings_argument,
     add_tables,
@@ -15,6 +14,8 @@ from ballplate.cli import (
     show,
     single,
 )
+
+from ..requirements.reach_command import add_goal
 
 DESCRIPTION = (
     "Judge the readings taken so far: standard deviation from the residuals, flagged gross errors"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from ballplate.cli import UsageError, add_file, add_goal, add_json, show, single, whole
+from ballplate.cli import UsageError, add_file, add_json, percentage, show, single, whole
 
 UNKNOWNS = (
     *("repeatability", "certificate", "tips", "thermometers", "repeats", "balls", "size"),
@@ -83,3 +83,26 @@ def run(options: Namespace) -> int:
         return 0 if result.present.is_met else 1
     met = [answer.is_met for answer in result.answers]
     return 0 if (all if options.by else any)(met) else 1
+
+
+def add_goal(parser: ArgumentParser, quantities: str) -> None:
+    """Add the goal, with examples of quantities, and the replacement of the target."""
+    parser.add_argument(
+        "--goal",
+        default="lengths",
+        help=(
+            "lengths (default: distances between corrected points, U6, within target_uncertainty),"
+            f" tasks, or a quantity such as {quantities}"
+        ),
+    )
+    parser.add_argument(
+        "--share",
+        metavar="95%",
+        type=percentage,
+        help="share of the lengths that must be within the target; default: all",
+    )
+    parser.add_argument(
+        "--target",
+        metavar="LENGTH",
+        help='target instead of target_uncertainty, such as "0.5 um + L/1000000"',
+    )
