@@ -16,11 +16,7 @@ from tests.extensions.pages.browser import tab
 from tests.extensions.studio import pictures as of_studio
 
 # Height of each picture of a page, and the element that it begins with.
-SHOWN = {
-    "design-page": (880, "h1"),
-    "fit-page": (820, "#curves"),
-    "sweep-page": (1010, "h1"),
-}
+SHOWN = {"design-page": (880, "h1"), "fit-page": (820, "#curves"), "sweep-page": (1010, "h1")}
 WIDTH = 1100
 
 

@@ -48,20 +48,14 @@ def printed(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:
             lambda: bp.spline(TABLE, y="finish_error", points="12-32", start_slope="0"),
             ("spline", TABLE, "--y=finish_error", "--points=12-32", "--start-slope=0"),
         ),
-        (
-            lambda: bp.reproduce("npl", "6.1.2"),
-            ("reproduce", "npl", "--experiment=6.1.2"),
-        ),
+        (lambda: bp.reproduce("npl", "6.1.2"), ("reproduce", "npl", "--experiment=6.1.2")),
         (
             lambda: bp.reach(QUICKSTART, unknowns="repeatability", target="1 um", share=0.9),
             ("reach", QUICKSTART, "--by=repeatability", "--target=1 um", "--share=90%"),
         ),
         (
             lambda: bp.check("designs/certified/deficient.yaml", "U6 average 1 um", suggest=True),
-            (
-                *("check", "designs/certified/deficient.yaml", "--goal=U6 average 1 um"),
-                "--suggest",
-            ),
+            (*("check", "designs/certified/deficient.yaml", "--goal=U6 average 1 um"), "--suggest"),
         ),
         (
             lambda: bp.fit(bp.load(REAL[0], "with scale"), REAL[1], estimator="reversal"),

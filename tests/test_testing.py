@@ -20,10 +20,7 @@ from tests.extensions.own_models.test_python_values import module
 
 @pytest.mark.parametrize(
     "model",
-    [
-        kinematic_model(ARRANGEMENTS["CX1"], 5, 5, (0, 0, 0), (1, 1, 1), True),
-        MetricModel("x"),
-    ],
+    [kinematic_model(ARRANGEMENTS["CX1"], 5, 5, (0, 0, 0), (1, 1, 1), True), MetricModel("x")],
 )
 def test_models(model: Any) -> None:
     lower, upper = np.zeros(model.dimension), np.ones(model.dimension)

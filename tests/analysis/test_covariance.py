@@ -88,11 +88,7 @@ def covariance_of(jacobian: Real, spread: dense.Spread) -> Real:
 
 @pytest.mark.parametrize(
     ("make", "coefficients", "deficiency"),
-    [
-        (grid_of_four, 5, 0),
-        (repeats, 5, 0),
-        (deficient_grid_of_four, 7, 6),
-    ],
+    [(grid_of_four, 5, 0), (repeats, 5, 0), (deficient_grid_of_four, 7, 6)],
 )
 def test_covariances_are_those_of_the_dense_reference(
     make: Callable[[], Design], coefficients: int, deficiency: int

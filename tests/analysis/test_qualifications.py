@@ -24,11 +24,7 @@ from tests.reference.small_quickstart import small_sections
 ASSUMED = {"tips": "1 nm", "common": "1 nm", "temperature": "1 mK", "sag": "1 nm"}
 ASSUMED |= {"drift": "1 nm/h", "scatter": 1.01}
 TINY = {"kind": "random", "position": "1 nm", "rotation": "1 nrad", "seed": 2}
-BASE: dict[str, Any] = {
-    "assumptions": ASSUMED,
-    "true_machine": TINY,
-    "target_uncertainty": "5 um",
-}
+BASE: dict[str, Any] = {"assumptions": ASSUMED, "true_machine": TINY, "target_uncertainty": "5 um"}
 # In an output: what must be there with the qualification, and must not be without.
 WORDS = {
     "scale": "exact probe offsets as scale|scale rests on probe offsets",

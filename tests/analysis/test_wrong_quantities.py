@@ -108,10 +108,7 @@ def test_tasks_have_targets_of_their_own() -> None:
     ends = {"from": ["100 mm", "100 mm", "100 mm"], "to": ["500 mm", "100 mm", "100 mm"]}
     far = {"from": ["100 mm", "100 mm", "100 mm"], "to": ["100 mm", "900 mm", "100 mm"]}
     own = "1 um + L/1000000"
-    tasks = [
-        {"name": "near", **ends, "target_uncertainty": own},
-        {"name": "far", **far},
-    ]
+    tasks = [{"name": "near", **ends, "target_uncertainty": own}, {"name": "far", **far}]
     given = {"evaluation.tasks": tasks, "target_uncertainty": "3 um"}
     # 1.4 µm for 400 mm, and that of the file.
     assert target("tasks", **given) == pytest.approx(0.5 * (1.4e-6 + 3e-6))

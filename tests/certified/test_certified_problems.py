@@ -38,8 +38,7 @@ def shipped(name: str) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize(
-    "name",
-    [pytest.param(name, marks=() if name in QUICK else pytest.mark.long) for name in NAMES],
+    "name", [pytest.param(name, marks=() if name in QUICK else pytest.mark.long) for name in NAMES]
 )
 def test_answers_come_out_again(name: str) -> None:
     number = NAMES.index(name)

@@ -70,8 +70,7 @@ def test_a_true_machine_too_wild_is_told(
 
 
 @pytest.mark.parametrize(
-    "options",
-    [["--trials", "1"], ["--trials", "many"], ["--until", "0%"], ["--workers", "-1"]],
+    "options", [["--trials", "1"], ["--trials", "many"], ["--until", "0%"], ["--workers", "-1"]]
 )
 def test_wrong_options(options: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as caught:

@@ -97,11 +97,4 @@ def test_no_alarm_is_left_out() -> None:
     for kept in ({0}, {8}, set[int]()):
         shown = examples.with_gaps(lines, kept)
         assert all(line in shown for line in (*lines[3:5], *lines[6:8])) and lines[5] not in shown
-    assert examples.with_gaps(lines, {0}) == [
-        lines[0],
-        "…",
-        *lines[3:5],
-        "…",
-        *lines[6:8],
-        "…",
-    ]
+    assert examples.with_gaps(lines, {0}) == [lines[0], "…", *lines[3:5], "…", *lines[6:8], "…"]

@@ -55,14 +55,7 @@ def test_without_extras_a_command_works_or_its_page_names_the_extra(
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    for package in (
-        "distributed",
-        "matplotlib",
-        "pyarrow",
-        "shtab",
-        "starlette",
-        "uvicorn",
-    ):
+    for package in ("distributed", "matplotlib", "pyarrow", "shtab", "starlette", "uvicorn"):
         monkeypatch.setitem(sys.modules, package, None)
     status = main(shlex.split(command.format(folder=tmp_path)))
     if status:

@@ -64,16 +64,8 @@ def scattered(count: int, seed: int, lowest: float = 0.0) -> list[list[str]]:
 BOTH = {
     "artefacts": {
         "bar": {"kind": "two_spheres", "length": "400 mm", "role": "length_standard"},
-        "gauge": {
-            "kind": "bryan_gauge",
-            "radius": "300 mm",
-            "directions": scattered(12, 1, 10.0),
-        },
-        "short": {
-            "kind": "bryan_gauge",
-            "radius": "200 mm",
-            "directions": scattered(6, 2),
-        },
+        "gauge": {"kind": "bryan_gauge", "radius": "300 mm", "directions": scattered(12, 1, 10.0)},
+        "short": {"kind": "bryan_gauge", "radius": "200 mm", "directions": scattered(6, 2)},
     },
     "probes": {
         "magnet": ["0 mm", "0 mm", "0 mm"],
@@ -217,11 +209,7 @@ def test_where_the_ball_was_to_be_does_not_matter(tmp_path: Path) -> None:
         tmp_path,
         "bryan-gauge",
         artefacts={
-            "gauge": {
-                "kind": "bryan_gauge",
-                "radius": "300 mm",
-                "directions": scattered(60, 4),
-            }
+            "gauge": {"kind": "bryan_gauge", "radius": "300 mm", "directions": scattered(60, 4)}
         },
         positions=[{"name": "pivot", "pose": {"origin": ["480 mm", "430 mm", "120 mm"]}}],
     )

@@ -261,9 +261,7 @@ def physical(
 
 
 @pytest.mark.parametrize(
-    ("standard", "known"),
-    [(bar(6), GROWING), (flat(2), ALL)],
-    ids=["six", "plate"],
+    ("standard", "known"), [(bar(6), GROWING), (flat(2), ALL)], ids=["six", "plate"]
 )
 def test_fits_of_readings_drawn_by_hand(
     standard: dict[str, Any], known: dict[str, Any], tmp_path: Path

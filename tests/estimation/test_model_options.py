@@ -59,9 +59,7 @@ def spatial(error_model: dict[str, Any], deficient: bool = False) -> dict[str, A
             "right": ["60 mm", "0 mm", "0 mm"],
             "back": ["0 mm", "70 mm", "-10 mm"],
         },
-        "artefacts": {
-            "plate": {"kind": "grid", "balls": [5, 5], "size": ["600 mm", "560 mm"]},
-        },
+        "artefacts": {"plate": {"kind": "grid", "balls": [5, 5], "size": ["600 mm", "560 mm"]}},
         "positions": positions,
         "calibration": [{**SIDE, "artefact": "plate", "pairs": "corners"}],
         "evaluation": {"points": {"random": 25, "seed": 2}, "probe": "right"},

@@ -173,7 +173,7 @@ PAIRS: dict[str, Pair] = {
                     ball: [f"{375 * column} mm", f"{375 * row} mm", "0 mm"]
                     for ball, (row, column) in zip(BALLS, np.ndindex(3, 3), strict=True)
                 },
-            },
+            }
         },
         {DISTANCES + ".pairs": SIDES},
     ),
@@ -251,11 +251,7 @@ PAIRS: dict[str, Pair] = {
         priors(("z high: origin z", "2 um")),
         {
             "priors": [
-                {
-                    "parameter": "z high: origin z",
-                    "value": "750 mm",
-                    "standard_uncertainty": "2 um",
-                }
+                {"parameter": "z high: origin z", "value": "750 mm", "standard_uncertainty": "2 um"}
             ]
         },
     ),

@@ -435,3 +435,12 @@ def test_no_section_breaks_the_loader(tmp_path: Path, section: str, value: objec
         load(tmp_path / "e.yaml")
     except ExperimentError as error:
         assert error.messages
+
+
+@pytest.mark.parametrize("line", ["sigm: given", "coverage_facto: 2"])
+def test_a_misspelt_key_has_no_default_in_a_tolerant_load(tmp_path: Path, line: str) -> None:
+    text = Path("designs/quickstart.yaml").read_text(encoding="utf-8")
+    (tmp_path / "e.yaml").write_text(f"{text}\n{line}\n", encoding="utf-8")
+    (experiment,) = load(tmp_path / "e.yaml", tolerant=True)
+    name = {"sigm": "sigma", "coverage_facto": "coverage_factor"}[line.partition(":")[0]]
+    assert getattr(experiment, name) is None and len(experiment.faults or ()) == 1

@@ -101,10 +101,7 @@ def test_the_base_need_not_be_complete(tmp_path: Path) -> None:
 
 def test_messages_stand_at_the_line_of_the_variant(tmp_path: Path) -> None:
     text = BASE + "variants:\n  A: {}\n  B:\n    positions[low].level: 5\n    seed: x\n"
-    assert refusals(tmp_path, text) == [
-        (wording.HAS_NO_UNIT),
-        (wording.EXPECTED_A_WHOLE),
-    ]
+    assert refusals(tmp_path, text) == [(wording.HAS_NO_UNIT), (wording.EXPECTED_A_WHOLE)]
 
 
 def test_a_message_about_the_base_comes_once(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ import json
 import re
 from pathlib import Path
 
+import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.simulator.design import objects
@@ -321,3 +322,15 @@ def test_the_schema_knows_the_places_that_are_read() -> None:
         assert is_allowed is is_valid
         with contextlib.nullcontext() if is_valid else pytest.raises(QuantityError):
             parse_place(place)
+
+
+def test_few_positions_are_placed_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All balls of all positions together would take a gigabyte for a thousand of the largest."""
+    counts, placed, experiment = [], bounds.balls_in_machine, bp.quickstart()
+    monkeypatch.setattr(
+        bounds, "balls_in_machine", lambda p, at: counts.append(len(p)) or placed(p, at)
+    )
+    poses = [place.pose for place in experiment.positions] * 30
+    balls = bounds.balls_of(poses, [experiment.layouts["plate"]] * len(poses))
+    first = next(balls)
+    assert counts == [bounds.AT_ONCE] and first.shape == (25, 3) and len([first, *balls]) == 180

@@ -190,10 +190,7 @@ def test_messages_of_lengths(value: object, message: str) -> None:
             "1 um + -2 ppm",
             '"1 um + -2 ppm" has a negative part; write for example "0.5 um + L/1000000"',
         ),
-        (
-            "1 um + 100 ppm",
-            '"1 um + 100 ppm" grows by 100 um/m; give less than 100 um/m',
-        ),
+        ("1 um + 100 ppm", '"1 um + 100 ppm" grows by 100 um/m; give less than 100 um/m'),
         (
             "1 um + L/1e19",
             '"1 um + L/1e19" grows too slowly; leave out the growth, or give 1e-18 m/m or more',

@@ -86,10 +86,7 @@ def test_aliases_stand_where_they_are_used() -> None:
 @pytest.mark.parametrize(
     ("text", "lines"),
     [
-        (
-            "a: 1\nb: 2\na: 3\n",
-            ['f:3:1: the key "a" is already in line 1; remove one of the two'],
-        ),
+        ("a: 1\nb: 2\na: 3\n", ['f:3:1: the key "a" is already in line 1; remove one of the two']),
         (
             "a: {b: 1}\n<<: {c: 1}\n",
             [
@@ -132,10 +129,7 @@ def test_aliases_stand_where_they_are_used() -> None:
                 " it, and check the indentation"
             ],
         ),
-        (
-            "a: @b\n",
-            ["f:1:4: not valid YAML: a text cannot begin with this character; quote it"],
-        ),
+        ("a: @b\n", ["f:1:4: not valid YAML: a text cannot begin with this character; quote it"]),
         ("a: µ\x07\n", ["f:1:5: the control character U+0007 is not allowed; remove it"]),
         (
             "a: " + "9" * 400,

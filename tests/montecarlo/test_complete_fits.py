@@ -115,9 +115,7 @@ def test_what_is_left_to_a_separate_estimate_has_not_converged() -> None:
 
 
 @pytest.mark.parametrize(
-    "design",
-    [small(), with_unknown_probes()],
-    ids=["distances", "probes and length"],
+    "design", [small(), with_unknown_probes()], ids=["distances", "probes and length"]
 )
 def test_an_estimate_by_itself_is_that_of_the_passes(
     design: Design, monkeypatch: pytest.MonkeyPatch

@@ -250,13 +250,7 @@ def assert_agree(shared: Reference, found: Estimates, state: State, squares: flo
         plane(),
         with_unknown_probes(),
     ],
-    ids=[
-        "neighbours",
-        "co-ordinates",
-        "projected",
-        "plane",
-        "probes and length",
-    ],
+    ids=["neighbours", "co-ordinates", "projected", "plane", "probes and length"],
 )
 def test_each_replicate_is_the_estimate_of_its_own_readings(design: Design) -> None:
     shared = reference(design, truth(design))

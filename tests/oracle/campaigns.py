@@ -269,11 +269,7 @@ def campaign_file(seed: int, folder: Path, **changed: Any) -> Path:
         "positions": positions,
         "calibration": [
             {"kind": "distances", "pairs": "corner sides", "standard_uncertainty": "0.3 um"},
-            {
-                "kind": "coordinates",
-                "balls": ["r1c1", "r2c2"],
-                "standard_uncertainty": "0.5 um",
-            },
+            {"kind": "coordinates", "balls": ["r1c1", "r2c2"], "standard_uncertainty": "0.5 um"},
         ],
         "evaluation": {"points": {"random": 10, "seed": seed}, "probe": "right"},
         "target_uncertainty": "0.3 um + L/1000000",

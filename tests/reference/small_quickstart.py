@@ -14,11 +14,7 @@ import yaml
 PLATE = {"kind": "grid", "balls": [3, 3], "size": ["750 mm", "750 mm"]}
 SMALL: dict[str, Any] = {
     "artefacts": {"plate": PLATE},
-    "error_model": {
-        "kind": "kinematic",
-        "position_coefficients": 3,
-        "rotation_coefficients": 2,
-    },
+    "error_model": {"kind": "kinematic", "position_coefficients": 3, "rotation_coefficients": 2},
 }
 
 

@@ -40,10 +40,7 @@ LINES = (
     "map machine.yaml --grid 2,2,2 --plot out.svg",
 )
 # With several processes.
-COMMANDS = (
-    "plan pool.yaml --hours 2 --curve --workers 2",
-    "sweep own.yaml --workers 2",
-)
+COMMANDS = ("plan pool.yaml --hours 2 --curve --workers 2", "sweep own.yaml --workers 2")
 # Every command, one after the other in one process: what any of them loads shows.
 ALL = """
 import shlex, sys

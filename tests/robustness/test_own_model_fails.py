@@ -144,8 +144,7 @@ def test_each_way_to_fail_is_told_with_its_place(
 
 @pytest.mark.parametrize("command", COMMANDS)
 @pytest.mark.parametrize(
-    "way",
-    [way if way == "raises" else pytest.param(way, marks=pytest.mark.long) for way in WAYS],
+    "way", [way if way == "raises" else pytest.param(way, marks=pytest.mark.long) for way in WAYS]
 )
 def test_every_command_tells_the_place(
     way: str,

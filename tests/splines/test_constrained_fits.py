@@ -162,9 +162,7 @@ def test_as_many_constraints_as_freedom_is_interpolation() -> None:
 
 
 @st.composite
-def problems(
-    draw: st.DrawFn,
-) -> tuple[SplineSpace, np.ndarray, np.ndarray, tuple[Constraint, ...]]:
+def problems(draw: st.DrawFn) -> tuple[SplineSpace, np.ndarray, np.ndarray, tuple[Constraint, ...]]:
     order = draw(st.integers(2, 6))
     lower = draw(st.sampled_from([0.0, -3.0, 1e3]))
     length = draw(st.sampled_from([1.0, 1e-3, 60.0]))

@@ -142,10 +142,7 @@ def test_another_chain_is_what_a_fit_of_its_readings_gives() -> None:
     simulated = simulated_readings(other, exact=True)
     ends = [
         points + model.error(points, values, offsets)
-        for model, values in (
-            (fitted.model, fitted.values),
-            (simulated.model, simulated.truth.a),
-        )
+        for model, values in ((fitted.model, fitted.values), (simulated.model, simulated.truth.a))
     ]
     first, second = np.triu_indices(len(points), 1)
     estimated, true = (np.linalg.norm(end[first] - end[second], axis=1) for end in ends)

@@ -29,9 +29,7 @@ def sheet(experiment: Experiment) -> RunSheet:
     )
     by_name = {one.name: one for one in experiment.pool.candidates}
     return run_sheet(
-        [by_name[name] for name in wanted],
-        experiment.pool.changes,
-        done=[by_name["flat low"]],
+        [by_name[name] for name in wanted], experiment.pool.changes, done=[by_name["flat low"]]
     )
 
 

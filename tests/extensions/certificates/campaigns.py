@@ -9,12 +9,7 @@ PLACES: list[dict[str, Any]] = [
     {"plane": "z", "level": "100 mm", "corner": CORNER, "probes": ["down"]},
     {"plane": "z", "level": "400 mm", "corner": CORNER, "probes": ["down"]},
     {"plane": "z", "level": "250 mm", "corner": CORNER, "quarter_turns": 1, "probes": ["down"]},
-    {
-        "plane": "x",
-        "level": "150 mm",
-        "corner": {"y": "50 mm", "z": "50 mm"},
-        "probes": ["right"],
-    },
+    {"plane": "x", "level": "150 mm", "corner": {"y": "50 mm", "z": "50 mm"}, "probes": ["right"]},
     {
         "plane": "y",
         "level": "350 mm",

@@ -73,10 +73,7 @@ def test_the_same_answers_give_the_file_of_init(
     [
         (
             {"volume": "900 1200 700 500 mm", "temperature": "20 degC"},
-            {
-                "volume": wording.FOUR_LENGTHS,
-                "temperature": wording.NO_UNCERTAINTY_OF_TEMPERATURE,
-            },
+            {"volume": wording.FOUR_LENGTHS, "temperature": wording.NO_UNCERTAINTY_OF_TEMPERATURE},
         ),
         ({"repeatability": "2 um"}, {"repeatability": wording.COARSE_REPEATABILITY}),
     ],

@@ -20,11 +20,7 @@ SHAPES = {
     "cube": {"volume": "500 500 500 mm", "plate": "5 x 5, 250 mm"},
     "small": {"volume": "500 400 300 mm", "plate": "5 x 5, 200 mm"},
     "bridge": {},
-    "arm": {
-        "machine_type": "horizontal arm",
-        "volume": "1 x 2.5 x 1.5 m",
-        "mpe": "10 um + L/100",
-    },
+    "arm": {"machine_type": "horizontal arm", "volume": "1 x 2.5 x 1.5 m", "mpe": "10 um + L/100"},
     "gantry": {"machine_type": "gantry", "volume": "2 x 3 x 1 m", "mpe": "3 um + L/250"},
 }
 # Quarters of the free room, and turns: what the start is compared with.

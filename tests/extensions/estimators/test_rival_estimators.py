@@ -76,11 +76,7 @@ def test_repeats_of_a_length_standard_are_not_mistaken_for_other_readings() -> N
 
 @pytest.mark.parametrize(
     ("estimator", "pair_set", "across_probes"),
-    [
-        ("distances", "braced", True),
-        ("cresto", "all", False),
-        ("kruth", None, False),
-    ],
+    [("distances", "braced", True), ("cresto", "all", False), ("kruth", None, False)],
 )
 def test_more_terms_than_there_is_memory_for(
     monkeypatch: pytest.MonkeyPatch,

@@ -224,12 +224,7 @@ def _again(name: str) -> list[dict[str, Any]]:
 
 
 @pytest.mark.parametrize(
-    "name",
-    [
-        "nothing",
-        "the first position at the end",
-        "the corners at the end of each position",
-    ],
+    "name", ["nothing", "the first position at the end", "the corners at the end of each position"]
 )
 def test_the_page_states_what_reading_again_buys(name: str, tmp_path: Path) -> None:
     """The uncertainties of unknown drifts, and the mean U6 with them, by the dense computation."""

@@ -9,11 +9,7 @@ from ballplate.extensions.laboratory.headings import Vocabulary, read_headings
 from ballplate.simulator.inputs import DURATION_UNITS
 
 DEGREES = {"degC": Fraction(1)}
-FURTHER = {
-    "time": DURATION_UNITS,
-    "temperature_artefact": DEGREES,
-    "temperature_scales": DEGREES,
-}
+FURTHER = {"time": DURATION_UNITS, "temperature_artefact": DEGREES, "temperature_scales": DEGREES}
 WORDS = Vocabulary(("x", "y", "z"), ("down", "up"), ("low", "high"), further=FURTHER)
 ROLES = ["position", "ball", "probe", "unit", *FURTHER]
 

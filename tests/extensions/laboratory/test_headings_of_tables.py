@@ -61,9 +61,7 @@ def test_a_heading_that_occurs_twice_is_named_with_its_line(
     assert f't.csv:2:1: the heading "{doubled}" occurs more than once' in text
 
 
-def test_columns_that_influences_ask_for_are_read_in_any_table(
-    readings: pandas.DataFrame,
-) -> None:
+def test_columns_that_influences_ask_for_are_read_in_any_table(readings: pandas.DataFrame) -> None:
     """Temperatures of a table with semicolons are those of the plain file."""
     influence = {
         "kind": "temperature",

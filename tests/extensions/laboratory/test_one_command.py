@@ -177,8 +177,7 @@ def test_the_rule_of_names_in_a_report_can_be_stated(
 
 
 @pytest.mark.parametrize(
-    ("file", "plain_file"),
-    [("qif_3_0.qif", "plain/mm6.csv"), ("calypso_fet.txt", "plain/mm7.csv")],
+    ("file", "plain_file"), [("qif_3_0.qif", "plain/mm6.csv"), ("calypso_fet.txt", "plain/mm7.csv")]
 )
 def test_names_of_reports_are_matched_by_number_and_place_as_those_of_tables(
     file: str, plain_file: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -28,9 +28,7 @@ def test_reports_of_another_experiment_are_told_by_their_names(
     assert len(text.splitlines()) == 1
 
 
-def test_what_was_done_of_a_plan_is_told_by_tables(
-    capsys: pytest.CaptureFixture[str],
-) -> None:
+def test_what_was_done_of_a_plan_is_told_by_tables(capsys: pytest.CaptureFixture[str]) -> None:
     """A report has names of an experiment, which the pool of a plan is not yet."""
     report = str(SAMPLES / "dmis_mm.dmo")
     assert main(["plan", POOL, "--positions", "4", "--done", report, "-q"]) == 3

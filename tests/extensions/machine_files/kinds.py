@@ -73,11 +73,7 @@ MODELS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "empirical": (IN_SPACE, {"kind": "empirical", "terms": "quadratic"}),
     "functions by axis": (
         IN_SPACE,
-        {
-            "kind": "empirical",
-            "basis": {"y": {"order": 3}},
-            "coefficients": {"x": 3, "z": 2},
-        },
+        {"kind": "empirical", "basis": {"y": {"order": 3}}, "coefficients": {"x": 3, "z": 2}},
     ),
     "estimated probe": (IN_SPACE | {"probes": FREE}, {"kind": "metric"}),
     "machine file": (IN_SPACE, {"kind": "machine", "file": "machine.yaml"}),

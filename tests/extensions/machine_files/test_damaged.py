@@ -105,12 +105,7 @@ EDITS: dict[str, tuple[Callable[[str], str], str, int, str]] = {
         1,
         "known: down",
     ),
-    "date": (
-        lambda text: text.replace('"2026-11-22"', '"2026-02-30"'),
-        "date:",
-        1,
-        "is no day",
-    ),
+    "date": (lambda text: text.replace('"2026-11-22"', '"2026-02-30"'), "date:", 1, "is no day"),
     "sigma": (
         lambda text: re.sub(r'sigma: \{"value": [^,]*', 'sigma: {"value": -1.0', text),
         "sigma:",

@@ -231,11 +231,7 @@ def test_what_is_wrong_with_a_machine(tmp_path: Path, old: str, new: str, messag
 @pytest.mark.parametrize(
     ("old", "new", "messages"),
     [
-        (
-            "y = 400 mm, z",
-            "y = 400 mm, y",
-            ["eyx.csv:2:9: y is given twice; give it once"],
-        ),
+        ("y = 400 mm, z", "y = 400 mm, y", ["eyx.csv:2:9: y is given twice; give it once"]),
         ("y = 400 mm", "x = 400 mm", ["eyx.csv:2:9: the line runs along x; leave it out"]),
         ("y = 400 mm", "y = 1,5 mm", ['eyx.csv:2:9: "1,5" has a decimal comma; write 1.5']),
         (
@@ -438,8 +434,5 @@ def test_a_machine_that_states_nothing_to_be_estimated(tmp_path: Path) -> None:
         "title: random\narrangement: MB1\nvolume: [1 m, 1 m, 1 m]\nerrors: {EXX: {bandwidth: 1"
         " um}}\n",
     )
-    with pytest.raises(
-        ExperimentError,
-        match=wording.YAML_STATES_NO_ERROR_THAT_COULD,
-    ):
+    with pytest.raises(ExperimentError, match=wording.YAML_STATES_NO_ERROR_THAT_COULD):
         load(experiment(tmp_path))

@@ -62,11 +62,7 @@ class Campaigns:
             "artefacts": {name: self.base["artefacts"]["plate"] for name in plates},
             "positions": positions,
             "calibration": [
-                {
-                    **CALIBRATION,
-                    "artefact": name,
-                    "standard_uncertainty": f"{0.3 * self.factor} um",
-                }
+                {**CALIBRATION, "artefact": name, "standard_uncertainty": f"{0.3 * self.factor} um"}
                 for name in plates
             ],
         }
@@ -158,10 +154,7 @@ def test_a_map_with_another_sigma_keeps_its_own(tmp_path: Path) -> None:
     campaigns.factor = 3.0
     alone = campaigns.fit_of_second(sigma="estimated")
     second = campaigns.experiment(
-        "B",
-        campaigns.second,
-        sigma="estimated",
-        priors=[{"kind": "map", "file": "first.yaml"}],
+        "B", campaigns.second, sigma="estimated", priors=[{"kind": "map", "file": "first.yaml"}]
     )
     fit: Any = bp.fit(second, campaigns.readings[~campaigns.of_first])
     found = fit.to_map()

@@ -25,11 +25,7 @@ from tests.reference.small_quickstart import SMALL, small_quickstart
 
 # By how much one probe's readings are wrong, in metres, and what that is.
 SHIFTS = {"clean": 0.0, "significant": 5e-6, "beyond": 1e-3}
-VERDICTS = {
-    "clean": "not significant",
-    "significant": "significant",
-    "beyond": "beyond the limit",
-}
+VERDICTS = {"clean": "not significant", "significant": "significant", "beyond": "beyond the limit"}
 
 
 @cache

@@ -74,10 +74,7 @@ def new_tab(browser: Browser, width: int = 1400, height: int = 900) -> Iterator:
     page = context.new_page()
     page.errors, page.asked = [], []
     page.on("pageerror", lambda error: page.errors.append(str(error)))
-    page.on(
-        "console",
-        lambda said: page.errors.append(said.text) if said.type == "error" else None,
-    )
+    page.on("console", lambda said: page.errors.append(said.text) if said.type == "error" else None)
     page.on("request", lambda request: page.asked.append(request.url))
     page.set_default_timeout(60_000)
     yield page

@@ -146,11 +146,7 @@ def test_the_map_has_bands_of_the_share_of_lengths_that_miss_the_target(met: str
     experiment = small()
     of_one = experiment.with_(target_uncertainty="1 um", coverage_factor=1)
     largest = length_map(of_one, (5, 5, 5)).maximum_ratio
-    limit = {
-        "some": np.quantile(largest, 0.3),
-        "all": 2 * largest.max(),
-        "none": largest.min() / 5,
-    }
+    limit = {"some": np.quantile(largest, 0.3), "all": 2 * largest.max(), "none": largest.min() / 5}
     changed = experiment.with_(target_uncertainty=None)
     if met != "no target":
         changed = experiment.with_(target_uncertainty=f"{limit[met]:.6g} um", coverage_factor=1)

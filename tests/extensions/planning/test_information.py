@@ -149,9 +149,7 @@ CASES: dict[str, dict[str, Any]] = {
         **WITHOUT_BAR,
         "influences": [{"kind": "re-indexing", "standard_uncertainty": "0.7 um"}],
     },
-    "holes": {
-        "artefacts": BASE["artefacts"] | {"plate": BASE["artefacts"]["plate"] | IN_PLANE},
-    },
+    "holes": {"artefacts": BASE["artefacts"] | {"plate": BASE["artefacts"]["plate"] | IN_PLANE}},
     "lengths that share readings": STANDARDS,
     # What is known all but exactly: of a machine's parameter, of a certificate, and beside readings
     # that are coarse.
@@ -296,8 +294,5 @@ def test_two_plates_of_unlike_certificates(tmp_path: Path, positions: int) -> No
                     best, np.inf if full.verdict.deficiency else full.quantities["U5"].average
                 )
     assert found.bound <= found.value == pytest.approx(best, rel=1e-9)
-    with pytest.raises(
-        ExperimentError,
-        match=wording.INCLUDES_THE_DISTANCES,
-    ):
+    with pytest.raises(ExperimentError, match=wording.INCLUDES_THE_DISTANCES):
         campaign(experiment, Request("U5", Budget(positions=1)))

@@ -134,10 +134,7 @@ def test_limits_are_of_indices(tmp_path: Path) -> None:
     )
     pool = pool_of(tmp_path, text)
     assert pool.must == (0,) and pool.at_most == (AtMost((1, 2, 3), 0),)
-    text = replaced(
-        "{of: {plane: x}, count: 1}]",
-        "{of: {group: bar, artefact: bar}, count: 1}]",
-    )
+    text = replaced("{of: {plane: x}, count: 1}]", "{of: {group: bar, artefact: bar}, count: 1}]")
     assert pool_of(tmp_path, text).at_most[-1] == AtMost((8,), 1)
 
 
@@ -185,10 +182,7 @@ def test_candidates_of_a_large_pool_are_counted() -> None:
 
 
 def test_out_of_volume_and_reach_and_edge_are_counted(tmp_path: Path) -> None:
-    text = replaced(
-        SOME_CORNERS,
-        "corners: {x: [0 mm, 600 mm], y: [300 mm, 600 mm]}",
-    )
+    text = replaced(SOME_CORNERS, "corners: {x: [0 mm, 600 mm], y: [300 mm, 600 mm]}")
     across = "corners: {y: [300 mm, 600 mm], z: [50 mm, 500 mm, 600 mm]}"
     text = replaced("corners: {y: [0 mm, 400 mm], z: 100 mm}", across, text)
     text = replaced("reach: {right: {x: [0 mm, 1 m]}}", "reach: {right: {x: [100 mm, 1 m]}}", text)
