@@ -47,8 +47,8 @@ def fit(
     design = observed.design
     solution = estimate(design, observed.x) if campaigns is None else campaigns.solution
     if solution.status != "converged":
-        # Without an estimate there is no linearisation of the fit. The rank is that of the nominal
-        # design with the readings that were made.
+        # Without an estimate there is no linearisation of the fit: the result has sigma as stated
+        # and empty tables. The rank is that of the nominal design with the readings that were made.
         judged = check(experiment, design).verdict
         names = experiment.label, experiment.title
         return Fit(

@@ -45,7 +45,6 @@ if TYPE_CHECKING:
     import pandas
     from ballplate.montecarlo.experiments import Trials
     from ballplate.presentation.table_columns import MainTable
-    from ballplate.simulator.experiment.model import Experiment
     from matplotlib.figure import Figure
 
 # Rows of a table; displacements of single readings may be thousands.

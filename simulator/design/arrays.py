@@ -287,7 +287,9 @@ class Observations(ABC):
         return self.uncertainty * generator.standard_normal((count, len(self)))
 
     def weights(self, design: Design, state: State) -> Array:
-        """Return the weights of rows, by the reciprocal of a length; zero weights are omitted."""
+        """Return the weights (m,) of rows, reciprocals of standard uncertainties; a row of weight
+        zero is omitted.
+        """
         return 1.0 / self.uncertainty
 
     def alike(self, design: Design, state: State) -> Self:

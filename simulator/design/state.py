@@ -25,8 +25,8 @@ class State:
 
 @dataclass(frozen=True)
 class Replicates:
-    """Differences of b replicates from the estimate `start` of readings without noise, which are
-    of the `truth`.
+    """Estimates of b replicates, as differences from `start`: the estimate from readings of the
+    `truth` without noise.
 
     `balls` (b, d, n) and `shared` (b, s) are the sums of their steps. Observations add to their
     S^2, `squares` (b,), and to half its gradient, `by_ball` (b, d, n) and `by_shared` (b, s).

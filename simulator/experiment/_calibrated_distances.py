@@ -127,6 +127,7 @@ def read_distances(
     )
     if uncertainties is None:
         return None
+    # The root is absent where the certificate states no covariance.
     standard, root = uncertainties
     if root is not None and references.artefacts[artefact].role == "length_standard":
         text = (

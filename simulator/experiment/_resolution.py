@@ -89,7 +89,8 @@ def resolve(
     is_complete = not has_pool if candidates is None else candidates.complete
     choices: tuple[Position, ...] = () if candidates is None else candidates.positions
     check_use(sections, positions, references, choices if is_complete else None, planning)
-    # What may read calibrated balls, and have priors; more than there is of it where some is wrong.
+    # Positions that may read calibrated balls, and have priors. In a plan those are the choices.
+    # `reader_count` counts invalid ones, too: what they read is not known, and not reported unread.
     off = [position for position in positions.values() if not position.enabled]
     enabled = {i: position for i, position in positions.items() if position.enabled}
     offered = tuple(choices or enabled.values())

@@ -2,7 +2,8 @@
 
 A further one of the kernel has its settings and its reader in a file beside this one (the radius of
 a gauge, which is short, has them here), its observations in `design.observations`, and a line in
-`CALIBRATIONS`; extensions have their own.
+`CALIBRATIONS`; extensions have their own. Settings with `artefact` make observations of its balls,
+`BallObservations`; those without state values of the machine, which cannot be correlated.
 """
 
 from __future__ import annotations

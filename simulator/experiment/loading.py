@@ -76,15 +76,12 @@ def load(
             experiments.append(replace(experiment, notes=(*experiment.notes, *notes)))
             size += experiment.size
         if size > MOST_OF_ALL and len(experiments) > 1:
-            text = (
+            too_many = (
                 f"the variants up to here have {size} balls, balls read, calibrated values, priors"
-                " and evaluation "
+                f" and evaluation points; at most {MOST_OF_ALL} are possible: move some of the"
+                " variants to a file of their own"
             )
-            text += (
-                f"points; at most {MOST_OF_ALL} are possible: move some of the variants to a file"
-                " of their own"
-            )
-            base_problems.add(("variants", name), text)
+            base_problems.add(("variants", name), too_many)
             break
         for message in messages:
             # A fault of the common part is in every variant, and is reported once, with the

@@ -1,4 +1,8 @@
-"""Protocol of all error models."""
+"""Protocol of all error models.
+
+A model of the kernel has its settings and a line in `ERROR_MODELS` of `settings.py`, beside this
+file; extensions have their own.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +28,7 @@ class Parameter:
     `unit` is that of its value: metres, radians, 1 for a ratio, or units of influence quantities.
     `function` is its error, by ISO 230-1 name if it has one, and `meaning` describes it. `effect`
     is the largest displacement of a corrected point in the volume, in metres per `unit`: it makes
-    different parameters comparable.
+    different parameters comparable, and columns are scaled by it before the rank is judged.
     """
 
     name: str
@@ -68,7 +72,8 @@ class ErrorModel(Protocol):
     """An error correction e(x, a, p) with e(x, 0, p) = p.
 
     A corrected point is x + e(x, a, p) for scale readings x, parameters a and probe offset p. The
-    model holds no state: one instance serves concurrent estimates.
+    model holds no state: one instance serves concurrent estimates. It is linear in p: derivatives
+    by free offsets are central differences over 0.1 m.
     """
 
     @property

@@ -52,7 +52,9 @@ class CertifiedValue:
 
 class Calibration(ABC):
     """An item of calibration of one `kind`; a frozen dataclass with the `values` (m, ...) that it
-    states, nominal unless `certified`.
+    states, nominal unless `certified`, and with standard uncertainties in fields whose names begin
+    with `standard_uncertaint`. A kind without these fields overrides what reads them: `size`,
+    `certified_values` and `with_values`.
 
     `artefact` is empty for values of the machine; their observations have no balls. `are_lengths`:
     values are distances between two balls, named in either order. `root` is that of the covariance
