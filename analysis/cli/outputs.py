@@ -21,7 +21,7 @@ from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
-from ballplate.simulator.computing.processes import interruptions_blocked
+from ballplate.simulator.computing.signals import interruptions_blocked
 
 if TYPE_CHECKING:
     from ballplate.presentation.files import Writer

@@ -13,7 +13,7 @@ from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from functools import partial
 from pathlib import Path
 
-from ballplate.simulator.computing.processes import interruptions_blocked
+from ballplate.simulator.computing.signals import interruptions_blocked
 
 Writer = Callable[[Path], object]
 """A function that writes the file of a path, in the format of the name's suffix."""

@@ -16,12 +16,12 @@ from .numerics import (
 from .processes import (
     begin_worker as begin_worker,
     in_processes as in_processes,
-    interruptions_blocked as interruptions_blocked,
     processors as processors,
     safe_path as safe_path,
     scipy_linalg as scipy_linalg,
     single_threaded as single_threaded,
 )
+from .signals import interruptions_blocked as interruptions_blocked
 from .steps import (
     EnoughError as EnoughError,
     InternalError as InternalError,

@@ -23,7 +23,7 @@ from typing import Any, ParamSpec, TypeVar
 from ballplate.simulator.inputs.module_finder import OwnModules, own_modules
 from threadpoolctl import ThreadpoolController
 
-from .signals import SAFE_PATH
+from .signals import SAFE_PATH, interruptions_blocked
 
 Result = TypeVar("Result")
 
@@ -194,19 +194,6 @@ def _start_trackers() -> None:
             resource_tracker.ensure_running()
     finally:
         sys.warnoptions.remove("ignore:resource_tracker:UserWarning")
-
-
-@contextmanager
-def interruptions_blocked(*others: int) -> Iterator[None]:
-    """Block SIGINT, and other signals, until the end; processes started meanwhile inherit it."""
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT, *others])
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def processors() -> int:
