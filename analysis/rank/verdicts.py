@@ -113,7 +113,8 @@ class Verdict:
     """Whether a design determines its parameters.
 
     `singular_values` are in standard deviations per micrometre, largest first, see `Spectrum`;
-    `gap` is the ratio across the border between determined and undetermined, `GREAT` at most.
+    `gap` is the ratio across the border between determined and undetermined, at most `GREAT`, and
+    infinite without a border.
     """
 
     parameters: int
@@ -215,8 +216,8 @@ def _weak_roots(at: Linearisation, target: Target | None) -> tuple[Array, Array]
     # Relative to one another: a motion of all corrected points as one body is no error of the
     # machine.
     change = relative_changes(at.design, at.layout, at.shared)
-    # All directions together have less than half of that effect, a margin for rounding: none is
-    # weak, and their decomposition is spared.
+    # Where the squares of all effects together are at most half of the limit's square, a margin for
+    # rounding, none is weak, and their decomposition is spared.
     if 2.0 * (change**2).sum() <= 0.5 * limit**2 * change[:, :, :1].size:
         return np.zeros((len(at.layout), 0)), np.zeros(0)
     root, effect = _principal(at)

@@ -1,6 +1,7 @@
 """All quantities whose uncertainties are reported: those of the kernel, and of extensions.
 
-`run`, Monte Carlo, sweeps, plans, reliability, goals and reports read `QUANTITIES`.
+`run`, Monte Carlo, sweeps, plans, reliability, goals and reports read `QUANTITIES`. A further one
+of the kernel is an entry of `KERNEL_QUANTITIES`; extensions provide a `QUANTITY`.
 """
 
 from __future__ import annotations

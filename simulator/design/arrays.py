@@ -139,8 +139,8 @@ class Design:
 
     @property
     def observation_count(self) -> int:
-        """Number of scalar observations: co-ordinates of all readings of plates, and calibration
-        items.
+        """Number of scalar observations: co-ordinates of all readings of plates, values of
+        calibrations, priors and all else that is observed.
 
         Of lengths that are read together only those count that do not follow from the others.
         """

@@ -1,4 +1,6 @@
-"""Names, units and indices of the parameters that all balls share: poses and machine errors."""
+"""Names, units and indices of the parameters that all balls share: poses, machine errors, probe
+offsets, and what observations add.
+"""
 
 from __future__ import annotations
 

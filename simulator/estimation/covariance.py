@@ -103,9 +103,9 @@ def _by_substitution_transposed(root: Array, side: Array) -> Array:
     return solution
 
 
-# Below this fraction of the largest singular value a direction is undetermined: rounding leaves
-# about 1e-14, and the weakest determined direction of a usable design is many orders of magnitude
-# above.
+# Below this fraction of the largest value (see `spectrum`) a direction is undetermined: rounding
+# leaves about 1e-14, and the weakest determined direction of a usable design is many orders of
+# magnitude above.
 RANK_TOLERANCE = 1e-10
 
 # The size of change that a singular value is quoted for.
@@ -120,8 +120,8 @@ class Spectrum:
     singular value is then the number of standard deviations by which the observations show such a
     change. `values` (s,) are sorted, largest first; `deficiency` counts the undetermined ones, and
     `gap` is the ratio of the smallest determined value to the largest undetermined one, if both
-    exist. With full rank the values are those of the scaled `triangle` (s, s), whose singular
-    vectors are computed on request; otherwise `known` (s, s) has the directions.
+    exist. With full rank and weights alike the values are those of the scaled `triangle` (s, s),
+    whose singular vectors are computed on request; otherwise `known` (s, s) has the directions.
     """
 
     values: Array
@@ -190,8 +190,9 @@ def spectrum(factor: Factor, drawn: Spectrum | None = None) -> Spectrum:
         # Values first: at full rank, the usual case, the vectors are computed only if something
         # asks for them.
         values = np.asarray(svd(scaled, compute_uv=False), float)
-        # Where nothing shared is determined, all values are rounding, of what the balls' rows have
-        # carried away.
+        # The threshold is relative to the largest singular value or, if it is larger, the largest
+        # element of what the balls' rows have carried away: where nothing shared is determined, all
+        # values are rounding of that.
         largest = max(
             float(values.max(initial=0.0)),
             *(
@@ -290,8 +291,8 @@ def ball_covariance(design: Design, factor: Factor, spectrum: Spectrum) -> BallC
     ball = np.zeros((n, d, rank + k))
     roots = np.zeros((n, d, d))
     ball_null = np.zeros((n, d, nulls))
-    # The three rows of a ball are R y + S t = z + e, with the shared parameters t and noise e of
-    # unit variance, which no other row has: y = R^-1 (z + e - S t). The covariance of the ball is
+    # The d rows of a ball are R y + S t = e - z, with the shared parameters t and noise e of unit
+    # variance, which no other row has: y = R^-1 (e - z - S t). The covariance of the ball is
     # the sum of two independent parts: R^-1 S G of the shared root G, which correlates balls with
     # one another, and R^-1 of its own rows. Undetermined directions move the ball by -R^-1 S as
     # well.

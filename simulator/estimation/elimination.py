@@ -6,13 +6,13 @@ rows of ball i are
 
     [B_i  C_i | r_i],  with  Q_i' [B_i  C_i | r_i] = [R_i  S_i | z_i; 0  T_i | w_i].
 
-The orthogonal Q_i leaves d rows that determine the ball (R_i, kept in `ball_root`, `ball_shared`,
-`ball_side`), and rows T_i for the shared parameters alone. All T_i go into one small triangular
-factor (`root`, `side`), from which `covariance` takes rank, null space and uncertainties, and
-`gauss_newton` the step. Time and memory grow in proportion to the readings. Neither the whole
-Jacobian nor normal equations are formed: these have the squares of singular values, of which all
-below 1e-8 drown in rounding, while the rank is judged at 1e-10. Balls linked by observations, such
-as calibrated distances, are kept and eliminated together at the end.
+The orthogonal Q_i leaves d rows that determine the ball (R_i, S_i and z_i: `ball_root`,
+`ball_shared` and `ball_side`), and rows T_i for the shared parameters alone. All T_i go into one
+small triangular factor (`root`, `side`), from which `covariance` takes rank, null space and
+uncertainties, and `gauss_newton` the step. Time and memory grow in proportion to the readings.
+Neither the whole Jacobian nor normal equations are formed: these have the squares of singular
+values, of which all below 1e-8 drown in rounding, while the rank is judged at 1e-10. Balls linked
+by observations, such as calibrated distances, are kept and eliminated together at the end.
 """
 
 from __future__ import annotations
@@ -205,7 +205,8 @@ def ensure_own_rows(design: Design) -> None:
     """Refuse balls of plates whose own rows cannot determine them.
 
     Each R_i has to be regular: the rank is judged by the shared factor alone, which would be full
-    beside a ball that nothing determines.
+    beside a ball that nothing determines. A count of rows suffices: a plate that is read in its
+    plane alone has to state its flatness, a row across the plane for each ball.
 
     :raises UnusableError: a ball has fewer rows of its own than co-ordinates.
     """
@@ -369,7 +370,7 @@ def _tied_rows(gathered: _Gathered, place_of: Integers, columns: int, s: int) ->
 
 
 def _absorbed(triangle: Array, rows: Array) -> Array:
-    """Triangular factor of `triangle` (up to s, s) with `rows` (m, s) below it."""
+    """Triangular factor of `triangle` (up to n, n) with `rows` (m, n) below it."""
     if len(rows) < ROWS_AT_ONCE // 2:
         return _triangle(np.concatenate([triangle, rows]))
     # Three times as fast on many rows, which pay for the time that it takes to import.

@@ -188,8 +188,7 @@ class Displacements:
     shared by all, and `own` (n, d, d) times d of their own.
 
     `null` (n, d, k) moves the points along undetermined directions from their nominal locations
-    `drawn` (n, d), by more than the rounding of `size` (n, d), which is zero for a determined
-    point.
+    `drawn` (n, d), by more than the rounding of `size` (n, d).
     """
 
     places: Array

@@ -109,8 +109,9 @@ class Linearisation:
         """
         result = np.sqrt(((rows @ self.shared) ** 2).sum(axis=1))
         rows = rows if drawn is None else drawn
-        # Rounding leaves a change along null directions even of determined functions. It is judged
-        # by the largest change that the function has for a step of a micrometre in any direction.
+        # `blank` makes NaN of functions that null directions change by more than `TOUCHED` of their
+        # size. Rounding leaves a change along null directions even of determined functions. It is
+        # judged by the largest change of a function for a step of a micrometre in any direction.
         size = np.sqrt(((rows * self.as_drawn.spectrum.scale) ** 2).sum(axis=1))
         return blank(result, rows @ self.shared_null, size)
 

@@ -1,7 +1,8 @@
 """All calibrations that a file may state: their kinds, and what is wrong with their values.
 
 A further one of the kernel has its settings and its reader in a file beside this one (the radius of
-a gauge, which is short, has them here), its observations in `design.observations`, and a line in
+a gauge, which is short, has them here), its `Calibration` and `Observations` in
+`design.observations`, and a line in
 `CALIBRATIONS`; extensions have their own. Settings with `artefact` make observations of its balls,
 `BallObservations`; those without state values of the machine, which cannot be correlated.
 """

@@ -65,7 +65,9 @@ def lay_out(experiment: Experiment, is_pool: bool = False) -> Design:
     >>> lay_out(load(Path("designs/quickstart.yaml"))[0]).dimension
     3
 
-    :raises ExperimentError: the experiment was loaded with its faults, and has some.
+    :raises ExperimentError: the experiment was loaded with its faults, and has some, or a prior is
+        of a pose parameter that is held.
+    :raises UnusableError: values of the machine are correlated.
     """
     if experiment.faults:
         raise ExperimentError(experiment.faults)

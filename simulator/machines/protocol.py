@@ -73,7 +73,7 @@ class ErrorModel(Protocol):
 
     A corrected point is x + e(x, a, p) for scale readings x, parameters a and probe offset p. The
     model holds no state: one instance serves concurrent estimates. It is linear in p: derivatives
-    by free offsets are central differences over 0.1 m.
+    by free offsets are central differences over 0.1 m to each side.
     """
 
     @property

@@ -99,7 +99,8 @@ class Calibration(ABC):
         drawn = [None] * len(observed)
         if self.are_lengths and isinstance(observed, BallObservations):
             drawn = observed.values(layout.coordinates)[0].tolist()
-        # What counts as something in an adjustment is exact in a certificate.
+        # A value without uncertainty has `EXACT` in an adjustment, so that rows can be weighted; in
+        # a certificate it is exact again.
         uncertainty = np.where(observed.is_exact, 0.0, observed.uncertainty).tolist()
         for (first, second), value, u, length in zip(
             self.names(layout), observed.value.tolist(), uncertainty, drawn, strict=True

@@ -58,7 +58,7 @@ def offset_sensitivity(model: ErrorModel, x: Array, a: Array, p: Array) -> Array
     """Return the derivative (m, d, d) of the error by the probe offset: identity plus the effect
     of the machine's rotations.
 
-    A rotation acts on the offset linearly, so that a central difference over a whole machine arm
+    A rotation acts on the offset linearly, so that a central difference over 0.1 m to each side
     is exact to rounding for every model of rigid axes.
     """
     m, d = x.shape
