@@ -25,7 +25,7 @@ from ballplate.simulator.inputs.arguments import (
 from ballplate.simulator.inputs.extensions import service
 
 from .arguments import SIGMAS, PathLike, experiment_of, load, observed_of
-from .results.estimator_choice import ESTIMATORS, EstimatorName, takers
+from .results.estimator_choice import ESTIMATORS, EstimatorName, fit_readings, takers
 from .simulator.experiment.model import Experiment
 
 if TYPE_CHECKING:
@@ -256,7 +256,6 @@ def fit(
     >>> fit(quickstart(), readings, estimator="distances", pairs="braced")
     <AlternativeFit of quickstart: distances, converged, full rank>
     """
-    from .results.estimator_choice import fit_readings
 
     ensure_one_of(SIGMAS, sigma=sigma)
     ensure_one_of(ESTIMATORS, estimator=str(estimator))

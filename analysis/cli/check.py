@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from ballplate.simulator.inputs.extensions import service
 
-from .common import add_file, add_formats, percentage
-from .notes import note, note_singular_values, tell_notes, warn
+from .common import add_file, add_formats, matching_files, percentage, print_json, print_lines
+from .notes import note, note_singular_values, print_errors, progress, tell_notes, warn
 from .outputs import UsageError
 
 if TYPE_CHECKING:
@@ -95,9 +95,6 @@ def run(options: Namespace) -> int:
     """Check all designs; return 1 unless all are as expected, 3 if a file cannot be used."""
     from ballplate.results.checked_files import Wanted, check_files
 
-    from .common import matching_files, print_json
-    from .notes import progress
-
     goals = _goals(options)
     wanted = Wanted(
         goals, options.fail_weak, options.suggest or options.fix, not options.no_modules
@@ -152,9 +149,6 @@ def _goals(options: Namespace) -> tuple[Any, ...]:
 
 
 def _print(checked: CheckedFile, options: Namespace) -> None:
-    from .common import print_lines
-    from .notes import print_errors
-
     tell_notes(checked.notes)
     warn(checked.doubts)
     if options.format == "github":

@@ -17,10 +17,10 @@ from types import FrameType
 from typing import Any
 
 from ballplate.simulator.computing.signals import ANSWERS
-from ballplate.simulator.inputs.extensions import UnusableError, fault_of, registered
+from ballplate.simulator.inputs.extensions import UnusableError, fault_of, missing, registered
 
 from ._parsers import grammar, parser, tell_of_extensions, with_command
-from .notes import told
+from .notes import print_errors, told
 from .outputs import UsageError, check_outputs
 
 
@@ -198,8 +198,6 @@ def _run(options: argparse.Namespace) -> int:
         print(in_one_line(f"ballplate {options.command}: {error}"), file=sys.stderr)
         return USAGE
     except ExperimentError as error:
-        from .notes import print_errors
-
         print_errors(error.messages, options)
         return BAD_FILE
     except UnusableError as error:
@@ -208,8 +206,6 @@ def _run(options: argparse.Namespace) -> int:
     except InternalError as error:
         return internal_error(error)
     except Exception as error:
-        from ballplate.simulator.inputs.extensions import missing
-
         if (gone := missing(error)) is not None:
             print(f"ballplate {options.command}: {gone}", file=sys.stderr)
             return BAD_FILE

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from ballplate.results.estimator_choice import DRAWN, ESTIMATORS, TAKE, fit_readings, takers
 from ballplate.simulator.inputs.extensions import service
 
-from .common import add_json, add_page, add_picture, day, map_path
+from .common import add_json, add_page, add_picture, day, map_path, show
 from .notes import note_singular_values, warn
 from .outputs import UsageError, add_force, add_output, write
 from .reading_options import add_pairs, add_readings, observed_readings, warn_of
@@ -90,8 +90,6 @@ def _add_estimators(parser: ArgumentParser) -> None:
 def run(options: Namespace) -> int:
     """Fit one experiment; 1 if there is something to complain of."""
     from ballplate.results.fits import Fit
-
-    from .common import show
 
     _refuse_misused(options)
     experiment, observed = observed_readings(options)

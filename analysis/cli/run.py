@@ -8,8 +8,19 @@ from typing import TYPE_CHECKING
 from ballplate.presentation.formatting import Data
 from ballplate.simulator.inputs.extensions import function, service
 
-from .common import add_file, add_json, add_page, add_workers, percentage, trial_count, whole
-from .notes import complain, note_singular_values
+from .common import (
+    add_file,
+    add_json,
+    add_page,
+    add_workers,
+    experiments,
+    percentage,
+    print_json,
+    print_lines,
+    trial_count,
+    whole,
+)
+from .notes import complain, note_singular_values, progress
 from .outputs import UsageError, add_force, write
 
 if TYPE_CHECKING:
@@ -65,8 +76,6 @@ def run(options: Namespace) -> int:
     """Plan all experiments of the files; 1 if the rank of one is not as expected."""
     from ballplate.results.prediction import predict
 
-    from .common import experiments, print_json, print_lines
-
     plans, results, interrupted = [], [], False
     with_trials = options.trials is not None or options.until is not None
     if not with_trials and (options.seed is not None or options.workers is not None):
@@ -111,8 +120,6 @@ def run(options: Namespace) -> int:
 
 
 def _write_page(options: Namespace, prediction: Prediction) -> None:
-    from .notes import progress
-
     with progress(options) as shown:
         text = function("page")(prediction, report=shown.show)
     write(options, {options.report: text})
@@ -121,8 +128,6 @@ def _write_page(options: Namespace, prediction: Prediction) -> None:
 def _trials(experiment: Experiment, options: Namespace) -> Trials:
     from ballplate.montecarlo.experiments import MOST_TRIALS, trials
     from ballplate.simulator.computing.processes import processors
-
-    from .notes import progress
 
     with progress(options) as shown:
 

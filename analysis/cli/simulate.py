@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TextIO
 
-from .common import add_file, whole
+from .common import add_file, single, whole
 from .notes import note
 from .outputs import add_force, add_output, text_writer, write
 
@@ -55,8 +55,6 @@ def run(options: Namespace) -> int:
     from ballplate.simulator.inputs.extensions import service
     from ballplate.simulator.readings.reading_files import write_readings
     from ballplate.simulator.readings.simulated import simulated_readings
-
-    from .common import single
 
     experiment = single(options)
     certificates = service("CertificateFiles") if options.certificate else None

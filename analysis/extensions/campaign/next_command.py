@@ -10,9 +10,13 @@ from ballplate.cli import (
     add_json,
     add_readings_argument,
     add_tables,
+    complain,
+    named_sources,
+    progress,
     refuse_wrong_order,
     show,
     single,
+    with_options,
 )
 
 from ..requirements.reach_command import add_goal
@@ -41,7 +45,6 @@ def run(options: Namespace) -> int:
     """Print the answer; 0 if the target is met, otherwise 1."""
     from dataclasses import replace
 
-    from ballplate.cli import complain, named_sources, progress, with_options
     from ballplate.extensions.requirements.goals import GoalError, parse_goal
     from ballplate.simulator.inputs import QuantityError, Target, parse_length_function
 

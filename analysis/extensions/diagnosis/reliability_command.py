@@ -4,7 +4,19 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 
-from ballplate.cli import UsageError, add_file, add_force, add_json, add_output, number, write
+from ballplate.cli import (
+    UsageError,
+    add_file,
+    add_force,
+    add_json,
+    add_output,
+    experiments,
+    number,
+    print_json,
+    print_lines,
+    progress,
+    write,
+)
 
 DESCRIPTION = (
     "Compute the redundancy of every observation of a design, the smallest biases of"
@@ -62,7 +74,6 @@ def _share(text: str) -> float:
 
 def run(options: Namespace) -> int:
     """Print the reliability of all experiments of the files."""
-    from ballplate.cli import experiments, print_json, print_lines, progress
 
     from .redundancy import reliability
 

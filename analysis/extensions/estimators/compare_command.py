@@ -4,7 +4,19 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from ballplate.cli import add_file, add_json, add_pairs, at_most, count, trial_count, whole
+from ballplate.cli import (
+    add_file,
+    add_json,
+    add_pairs,
+    at_most,
+    count,
+    experiments,
+    print_json,
+    print_lines,
+    progress,
+    trial_count,
+    whole,
+)
 from ballplate.results import COMPARED
 
 DESCRIPTION = (
@@ -51,7 +63,6 @@ def run(options: Namespace) -> int:
     """Compare the estimators for all experiments of the files; 1 if an estimate did not
     converge.
     """
-    from ballplate.cli import experiments, print_json, print_lines, progress
 
     from .distances import compare_estimators
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
 
-from ballplate.cli import add_json, add_readings, observed_readings, warn_of, whole
+from ballplate.cli import add_json, add_readings, observed_readings, progress, show, warn_of, whole
 
 DESCRIPTION = (
     "Fit the file's error model, kinematic ones with more and more coefficients and empirical ones,"
@@ -37,7 +37,6 @@ def _coefficients(text: str) -> int:
 
 def run(options: Namespace) -> int:
     """Compare error models; return 1 if no model is recommended."""
-    from ballplate.cli import progress, show
 
     from .compared_models import compared_models
     from .rungs import MOST_COEFFICIENTS

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from ballplate.cli import add_json, add_readings, observed_readings, warn_of
+from ballplate.cli import add_json, add_readings, observed_readings, progress, show, warn_of
 
 DESCRIPTION = (
     "Leave out each position in turn, predict its readings from all others,"
@@ -20,7 +20,6 @@ def add_options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Validate a fit; 1 if a prediction fails."""
-    from ballplate.cli import progress, show
 
     from .left_out import validate
 

@@ -6,7 +6,7 @@ import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from ballplate.cli import add_force, add_output, complain, note, rule, text_writer, write
+from ballplate.cli import add_force, add_output, complain, note, rule, single, text_writer, write
 
 DESCRIPTION = (
     "Read the centres of spheres out of reports that measuring programs write (DMIS output,"
@@ -79,7 +79,6 @@ def add_options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Write the table of readings in the reports."""
-    from ballplate.cli import single
 
     from .interface import read_report
 

@@ -11,6 +11,7 @@ from ballplate.cli import (
     add_json,
     add_output,
     add_picture,
+    complain,
     coverage_factor,
     day,
     show,
@@ -108,7 +109,6 @@ def _grid(text: str) -> int:
 
 def run(options: Namespace) -> int:
     """Compare, write and print; 1 with --fail if a change is shown."""
-    from ballplate.cli import complain
     from ballplate.simulator.inputs import QuantityError, Target, parse_length_function
 
     from .compared_maps import NotComparableError

@@ -17,6 +17,8 @@ from ballplate.cli import (
     note,
     number,
     page_path,
+    print_errors,
+    progress,
     show,
     single,
     whole,
@@ -148,7 +150,6 @@ def _hours(text: str) -> float:
 
 def run(options: Namespace) -> int:
     """Choose, print and write; 1 if the choice leaves something undetermined."""
-    from ballplate.cli import print_errors, progress
     from ballplate.simulator.computing import processors
     from ballplate.simulator.inputs import ExperimentError
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
 
-from ballplate.cli import UsageError, trial_count
+from ballplate.cli import UsageError, print_json, print_lines, progress, trial_count
 
 DESCRIPTION = (
     "Compute the experiments of NPL Report CISE 15/98, sections 5 and 6, from the shipped designs."
@@ -53,7 +53,6 @@ def add_options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Reproduce the report and return 1 unless everything agrees."""
-    from ballplate.cli import print_json, print_lines, progress
 
     from .reproduction_result import reproduce_npl
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
 
-from ballplate.cli import UsageError, add_file, add_json, percentage, show, single, whole
+from ballplate.cli import UsageError, add_file, add_json, percentage, progress, show, single, whole
 
 UNKNOWNS = (
     *("repeatability", "certificate", "tips", "thermometers", "repeats", "balls", "size"),
@@ -53,7 +53,6 @@ def add_options(parser: ArgumentParser) -> None:
 
 def run(options: Namespace) -> int:
     """Solve for the requested unknowns; return 1 if no value suffices."""
-    from ballplate.cli import progress
     from ballplate.simulator.inputs import QuantityError, parse_length_function
 
     from .goals import GoalError, parse_goal

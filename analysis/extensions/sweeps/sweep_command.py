@@ -9,7 +9,7 @@ from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ballplate.cli import UsageError, add_workers, complain
+from ballplate.cli import UsageError, add_workers, complain, duration, progress
 
 if TYPE_CHECKING:
     from ballplate.simulator.computing import ProgressStep
@@ -93,8 +93,6 @@ def run(options: Namespace) -> int:
 
 
 def _run(sweep: Sweep, bundle: Bundle, store: Store, options: Namespace) -> int:
-    from ballplate.cli import progress
-
     from .local import ChangedError
     from .running import compute_sweep, enter
 
@@ -154,7 +152,6 @@ def _report(store: Store, number: int, summary: Summary) -> None:
 
 
 def _dry_run(sweep: Sweep, options: Namespace) -> int:
-    from ballplate.cli import duration
     from ballplate.simulator.computing import processors
     from ballplate.simulator.inputs import number_of
 
