@@ -358,9 +358,6 @@ def correct(at: Linearisation, points: Array, probes: Integers, sigma: float) ->
     return CorrectedPoints(corrected_points(at.design, at.state, points, probes), root)
 
 
-AXES = ("x", "y", "z")
-
-
 def ensure_points(points: object, volume: Volume) -> Array:
     """Return a user's points as an array (n, d) in metres.
 
@@ -381,7 +378,9 @@ def ensure_points(points: object, volume: Volume) -> Array:
     if not np.isfinite(array).all():
         raise ValueError("points have co-ordinates that are no finite numbers; leave these out")
     for i, axis in np.argwhere(volume.far_outside(array)).tolist():
-        fact = f"{AXES[axis]} = {array[i, axis]:.6g} m of points[{i}] is far outside the volume"
+        fact = (
+            f"{AXIS_NAMES[axis]} = {array[i, axis]:.6g} m of points[{i}] is far outside the volume"
+        )
         raise ValueError(f"{fact}; give points in metres")
     return array
 

@@ -93,10 +93,8 @@ class DistancesSettings(CommonPartSettings):
 def read_distances(
     settings: DistancesSettings, artefact: str, steps: Steps, references: References
 ) -> DistanceCalibration | None:
-    layout, is_right = (
-        references.layouts[artefact],
-        _suits_role(settings, artefact, steps, references),
-    )
+    layout = references.layouts[artefact]
+    is_right = _suits_role(settings, artefact, steps, references)
     if references.dimension == 2 and settings.dimensions == 3:
         text = "a two-dimensional experiment has distances in 2 dimensions; remove it"
         references.problems.add((*steps, "dimensions"), text)
@@ -194,9 +192,7 @@ def _can_be_tied(balls: int, steps: Steps, references: References) -> bool:
         f"distances tie {balls} balls together, at most {MOST_TIED_BALLS} are possible; "
         "calibrate fewer distances, such as corner sides, or co-ordinates"
     )
-    if balls > MOST_TIED_BALLS:
-        references.problems.add(steps, text)
-    return balls <= MOST_TIED_BALLS
+    return references.require(balls <= MOST_TIED_BALLS, steps, text)
 
 
 def _pairs(

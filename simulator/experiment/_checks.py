@@ -9,6 +9,7 @@ import numpy as np
 from ballplate.simulator.design.observations.calibration import Calibration
 from ballplate.simulator.design.observations.distances import DistanceCalibration, RadiusCalibration
 from ballplate.simulator.geometry.artefacts import BryanGaugeSettings, TwoSpheresSettings
+from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.messages import Steps
 from ballplate.simulator.inputs.problems import Problems, written_texts
 from ballplate.simulator.inputs.quantities import QuantityError, parse_positive_length
@@ -181,9 +182,6 @@ def _balls(count: int) -> str:
     return "ball" if count == 1 else "balls"
 
 
-AXES = ("x", "y", "z")
-
-
 def check_readings(sections: Sections, references: References) -> None:
     """Report faults of the readings section beyond its form; read the file of a correction."""
     settings, problems = sections.readings, references.problems
@@ -201,13 +199,11 @@ def check_readings(sections: Sections, references: References) -> None:
         except ValueError as error:
             problems.add(("readings", "names"), str(error))
     for name, probe in (settings.probes or {}).items():
-        if probe not in references.probes:
-            text = f'unknown probe "{probe}"; {hint(probe, references.probes)}'
-            problems.add(("readings", "probes", name), text)
+        references.is_probe(probe, ("readings", "probes", name))
     if settings.columns is not None:
         if settings.columns.z is not None and references.dimension == 2:
             problems.add(("readings", "columns", "z"), "there are two dimensions; leave z out")
-        for axis in AXES:
+        for axis in AXIS_NAMES:
             columns = getattr(settings.columns, axis)
             if isinstance(columns, dict):
                 _check_probes(list(columns), ("readings", "columns", axis), references)
@@ -250,6 +246,4 @@ def is_text_encoding(name: str) -> bool:
 
 def _check_probes(names: list[str], steps: Steps, references: References) -> None:
     for name in names:
-        if name not in references.probes:
-            text = f'unknown probe "{name}"; {hint(name, references.probes)}'
-            references.problems.add((*steps, name), text, True)
+        references.is_probe(name, (*steps, name), of_key=True)

@@ -15,7 +15,7 @@ from ballplate.simulator.inputs.messages import Steps
 from ballplate.simulator.inputs.number_arrays import Array, Indices
 from ballplate.simulator.inputs.problems import Problems
 from ballplate.simulator.inputs.quantity_types import Place
-from ballplate.simulator.inputs.settings import hint, number_of
+from ballplate.simulator.inputs.settings import number_of
 from ballplate.simulator.inputs.units import format_length
 from ballplate.simulator.inputs.yamltree import Mark
 
@@ -147,15 +147,11 @@ def entered(around: Array, boxes: Array) -> Any:
 
 def _reach(limits: LimitsSettings, references: References) -> dict[str, Array]:
     """Lower and upper ends (2, d) of where balls can be read, by probe."""
-    problems, reach = references.problems, {}
+    reach = {}
     for name, region in limits.reach.items():
         steps = ("pool", "limits", "reach", name)
-        if name not in references.probes:
-            problems.add(
-                steps, f'unknown probe "{name}"; {hint(name, references.probes)}', of_key=True
-            )
-            continue
-        reach[name] = _ends(region, steps, references)
+        if references.is_probe(name, steps, of_key=True):
+            reach[name] = _ends(region, steps, references)
     return reach
 
 

@@ -2,9 +2,9 @@
 
 A further one of the kernel has its settings and its reader in a file beside this one (the radius of
 a gauge, which is short, has them here), its `Calibration` and `Observations` in
-`design.observations`, and a line in
-`CALIBRATIONS`; extensions have their own. Settings with `artefact` make observations of its balls,
-`BallObservations`; those without state values of the machine, which cannot be correlated.
+`design.observations`, and a line in `CALIBRATIONS`; extensions have their own. Settings with
+`artefact` make observations of its balls, `BallObservations`; those without state values of the
+machine, which cannot be correlated.
 """
 
 from __future__ import annotations
@@ -93,6 +93,7 @@ def read_calibration(
     settings: Any, artefact: str, steps: Steps, references: References
 ) -> Calibration | None:
     """Return the item of an artefact that the entry describes, or report faults."""
+    # Settings of a pool's calibrations, which have a price, are of subclasses.
     reader = next(
         (
             reader

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
 from ballplate.simulator.design.objects import Machine, Noise, NoiseSettings, Volume
 from ballplate.simulator.geometry.ball_layouts import frozen
+from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.messages import ExperimentError, Steps
 from ballplate.simulator.inputs.number_arrays import Array
 from ballplate.simulator.inputs.problems import Problems
 from ballplate.simulator.inputs.quantities import LengthFunction, Target
-from ballplate.simulator.inputs.settings import hint
 from ballplate.simulator.inputs.units import format_length, typed_length
 
 from .bounds import TOLERANCE, check_points
@@ -32,8 +31,6 @@ def check_ends(ends: Mapping[str, tuple[float, float]], steps: Steps, problems: 
     return not wrong
 
 
-AXES = ("x", "y", "z")
-
 # A repeatability (m) that is rather a slip of the unit.
 LARGE_REPEATABILITY = 1e-4
 
@@ -42,7 +39,7 @@ def resolve_machine(settings: MachineSettings, problems: Problems) -> Machine | 
     """Return the machine, or None after reporting faults."""
     ends: dict[str, tuple[float, float]]
     if isinstance(settings.volume, tuple):
-        ends = {axis: (0.0, edge) for axis, edge in zip(AXES, settings.volume, strict=False)}
+        ends = {axis: (0.0, edge) for axis, edge in zip(AXIS_NAMES, settings.volume, strict=False)}
     else:
         ends = settings.volume.stated
     is_right = check_ends(ends, ("machine", "volume"), problems)
@@ -51,7 +48,7 @@ def resolve_machine(settings: MachineSettings, problems: Problems) -> Machine | 
     if isinstance(settings.repeatability, float):
         by_axis = dict.fromkeys(ends, settings.repeatability)
     elif isinstance(settings.repeatability, tuple):
-        by_axis = dict(zip(AXES, settings.repeatability, strict=False))
+        by_axis = dict(zip(AXIS_NAMES, settings.repeatability, strict=False))
     else:
         by_axis = settings.repeatability.stated
     if by_axis.keys() != ends.keys():
@@ -115,11 +112,7 @@ def resolve_evaluation(
         return Evaluation(nowhere, probe)
     if settings.probe is not None:
         probe = settings.probe
-        references.require(
-            probe in references.probes,
-            ("evaluation", "probe"),
-            partial(_unknown, probe, references),
-        )
+        references.is_probe(probe, ("evaluation", "probe"))
     if settings.points is None and settings.tasks is None:
         text = (
             'has neither points nor tasks; add "points", such as {random: 200, seed: 1}, or "tasks"'
@@ -169,9 +162,7 @@ def _task(
     if settings.probe is not None or settings.probes is not None:
         for k, name in enumerate(used):
             where = ("probe",) if settings.probes is None else ("probes", k)
-            references.require(
-                name in references.probes, (*steps, *where), partial(_unknown, name, references)
-            )
+            references.is_probe(name, (*steps, *where))
     for key, point in (("from", settings.start), ("to", settings.to)):
         is_right = references.has_dimension(point, (*steps, key))
         if is_right and machine is not None and machine.dimension == len(point):
@@ -194,10 +185,6 @@ def target_of(sections: Sections, own_target: LengthFunction | None = None) -> T
     """
     target = own_target or sections.target_uncertainty
     return None if target is None else Target(target, sections.coverage_factor)
-
-
-def _unknown(probe: str, references: References) -> str:
-    return f'unknown probe "{probe}"; {hint(probe, references.probes)}'
 
 
 def _points(settings: Any, machine: Machine | None, references: References) -> Array | None:
@@ -234,7 +221,7 @@ def _points_of_file(
 
     assert references.dimension is not None
     try:
-        rows = read_table(references.file(file), [], AXES[: references.dimension])
+        rows = read_table(references.file(file), [], AXIS_NAMES[: references.dimension])
     except ExperimentError as error:
         references.problems.take(error, steps)
         return None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -78,13 +78,8 @@ class References:
                     (*steps, "artefact"), f'missing; add "artefact", one of: {choice}'
                 )
             return self.artefact_names[0] if len(self.artefact_names) == 1 else None
-        if name not in self.artefact_names:
-            self.problems.add(
-                (*steps, "artefact"),
-                f'unknown artefact "{name}"; {hint(name, self.artefact_names)}',
-            )
-            return None
-        return name
+        place = (*steps, "artefact")
+        return name if self._is_known("artefact", self.artefact_names, name, place) else None
 
     def check_written(self, steps: Steps) -> None:
         """Report unknown names in an invalid position or calibration."""
@@ -94,10 +89,8 @@ class References:
         probes = written(self.problems.root, *steps, "probes")
         for i in range(len(probes.items)) if isinstance(probes, SequenceNode) else ():
             probe = written_text(self.problems.root, *steps, "probes", i)
-            if probe is not None and probe not in self.probes:
-                self.problems.add(
-                    (*steps, "probes", i), f'unknown probe "{probe}"; {hint(probe, self.probes)}'
-                )
+            if probe is not None:
+                self.is_probe(probe, (*steps, "probes", i))
 
     def probe_names(self, names: tuple[str, ...] | None, steps: Steps) -> tuple[str, ...] | None:
         """Return the probes of a reading, or report faults."""
@@ -127,9 +120,11 @@ class References:
 
     def is_position(self, name: str, positions: Collection[str], steps: Steps) -> bool:
         """True if a name is of a position; otherwise a message."""
-        return self.require(
-            name in positions, steps, f'unknown position "{name}"; {hint(name, positions)}'
-        )
+        return self._is_known("position", positions, name, steps)
+
+    def is_probe(self, name: str, steps: Steps, of_key: bool = False) -> bool:
+        """True if a name is of a probe; otherwise a message."""
+        return self._is_known("probe", self.probes, name, steps, of_key)
 
     def are_probes(self, names: Sequence[str], steps: Steps) -> bool:
         """True if names listed at a path are of probes, each once, after reporting faults."""
@@ -176,6 +171,21 @@ class References:
         """Say that a key is one of three dimensions."""
         self.problems.add(steps, "has no meaning in two dimensions; remove it", of_key=True)
 
+    def _is_known(
+        self,
+        noun: str,
+        names_known: Collection[str],
+        name: str,
+        steps: Steps,
+        of_key: bool = False,
+    ) -> bool:
+        is_known = name in names_known
+        if not is_known:
+            # Only now: to find the nearest of thousands of names takes long.
+            text = f'unknown {noun} "{name}"; {hint(name, names_known)}'
+            self.problems.add(steps, text, of_key)
+        return is_known
+
     def _known_once(
         self, noun: str, names_known: Collection[str], names: Sequence[str], steps: Steps
     ) -> bool:
@@ -193,10 +203,10 @@ class References:
             names_seen.add(name)
         return len(self.problems.messages) == before
 
-    def require(self, is_right: bool, steps: Steps, text: Callable[[], str] | str) -> bool:
+    def require(self, is_right: bool, steps: Steps, text: str) -> bool:
         """Report a fault unless the condition holds; return the condition."""
         if not is_right:
-            self.problems.add(steps, text if isinstance(text, str) else text())
+            self.problems.add(steps, text)
         return is_right
 
 

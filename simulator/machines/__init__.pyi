@@ -2,7 +2,6 @@
 from .arrangement import (
     ARRANGEMENT as ARRANGEMENT,
     ARRANGEMENTS as ARRANGEMENTS,
-    AXES as AXES,
     AXIS_ERRORS as AXIS_ERRORS,
     ERRORS as ERRORS,
     PRODUCTS as PRODUCTS,

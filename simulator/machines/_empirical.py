@@ -16,7 +16,7 @@ from itertools import product
 
 import numpy as np
 from ballplate.simulator.geometry.ball_layouts import even_grid
-from ballplate.simulator.geometry.motions import cross_matrices
+from ballplate.simulator.geometry.motions import AXIS_NAMES, cross_matrices
 from ballplate.simulator.inputs.number_arrays import Array
 
 from ._rigid_chain import rotation_and_derivatives
@@ -50,7 +50,6 @@ USUAL_OFFSET = 0.1
 
 # Lines parallel to the axes that show a function's size and shape, by fractions of the volume.
 LEVELS = (0.0, 0.25, 0.5, 0.75, 1.0)
-AXES = ("x", "y", "z")
 
 
 @dataclass(frozen=True)
@@ -164,9 +163,9 @@ class EmpiricalModel:
             for axis in range(3):
                 fixed = [k for k in range(3) if k != axis]
                 location = " and ".join(
-                    f"{AXES[k]} {_level(level)}" for k, level in zip(fixed, pair, strict=True)
+                    f"{AXIS_NAMES[k]} {_level(level)}" for k, level in zip(fixed, pair, strict=True)
                 )
-                words.append(f"along {AXES[axis].upper()} at {location}")
+                words.append(f"along {AXIS_NAMES[axis].upper()} at {location}")
                 line = np.zeros((len(t), 3))
                 line[:, axis], line[:, fixed] = t, pair
                 points.append(line)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.number_arrays import Array
 
-from .arrangement import AXES, Arrangement
+from .arrangement import Arrangement
 
 
 def _plane_rotation(angle: Array, about: int, derivative: bool = False) -> Array:
@@ -55,7 +56,7 @@ def rigid_chain(
     # own displacement and error. A derivative by the angles of an axis is found in that axis's
     # frame. The rotations of all axes nearer to the base then turn it into the frame of the base.
     tip = p.astype(dtype, copy=True)
-    on_probe_side = [AXES.index(name) for name in arrangement.probe_side]
+    on_probe_side = [AXIS_NAMES.index(name) for name in arrangement.probe_side]
     for axis in reversed(on_probe_side):
         matrix, derivatives = rotation_and_derivatives(rotation[:, axis])
         by_rotation[axis] = np.stack([turned(d, tip) for d in derivatives], axis=2)
@@ -70,7 +71,7 @@ def rigid_chain(
     # rotation.
     passed = list(on_probe_side)
     for name in arrangement.workpiece_side:
-        axis = AXES.index(name)
+        axis = AXIS_NAMES.index(name)
         matrix, derivatives = rotation_and_derivatives(rotation[:, axis])
         back = matrix.transpose(0, 2, 1)
         outside = tip + step(axis)

@@ -8,12 +8,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Literal, Self
 
+from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.settings import Settings
 from pydantic import Field, model_validator
 
 from .protocol import Unit
-
-AXES = ("x", "y", "z")
 
 
 @dataclass(frozen=True)
@@ -30,7 +29,7 @@ class Arrangement:
     workpiece_side: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        if sorted(self.probe_side + self.workpiece_side) != list(AXES):
+        if sorted(self.probe_side + self.workpiece_side) != list(AXIS_NAMES):
             raise ValueError(
                 "an axis is missing or named twice; name each of x, y and z exactly once on the"
                 " two sides together"

@@ -13,16 +13,10 @@ from functools import cached_property, lru_cache
 from typing import ClassVar
 
 import numpy as np
+from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.number_arrays import Array
 
-from .arrangement import (
-    AXES,
-    AXIS_ERRORS,
-    SQUARENESS_ERRORS,
-    Arrangement,
-    AxisError,
-    SquarenessError,
-)
+from .arrangement import AXIS_ERRORS, SQUARENESS_ERRORS, Arrangement, AxisError, SquarenessError
 from .bases import Basis, Polynomial, Quoted, SingleFunction
 from .protocol import ErrorModel, HasLines, Line, Parameter, Reported
 
@@ -319,10 +313,10 @@ def carried_vectors(arrangement: Arrangement, x: Array, p: Array) -> list[tuple[
     by_axis = {}
     for side, sign in ((arrangement.probe_side, 1.0), (arrangement.workpiece_side, -1.0)):
         for index, axis in enumerate(side):
-            beyond = np.array([name in side[index + 1 :] for name in AXES])
+            beyond = np.array([name in side[index + 1 :] for name in AXIS_NAMES])
             vector = x * beyond + p if sign > 0 else x * ~beyond + p
             by_axis[axis] = (sign, vector)
-    return [by_axis[axis] for axis in AXES]
+    return [by_axis[axis] for axis in AXIS_NAMES]
 
 
 def _crossed(v: Array, w: Array) -> Array:

@@ -11,6 +11,7 @@ from typing import Literal
 
 import numpy as np
 from ballplate.simulator.computing.numerics import eigvalsh
+from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.number_arrays import Array
 
 from .protocol import Parameter, Reported
@@ -74,7 +75,6 @@ class MetricModel:
         return Reported.as_is(self.parameters)
 
 
-AXES = ("x", "y", "z")
 SQUARENESS = ("C0Y", "B0Z", "A0Z")
 
 
@@ -103,7 +103,7 @@ class SpatialMetricModel:
             Parameter(
                 f"scale {axis}", "1", f"scale {axis}", f"scale error of {axis.upper()}", span[i]
             )
-            for i, axis in enumerate(AXES)
+            for i, axis in enumerate(AXIS_NAMES)
         )
         squareness = tuple(
             Parameter(

@@ -1,7 +1,7 @@
 # Public names of this package, each loaded from its module when it is first used.
 from .joining import joined as joined
 from .observed_readings import ObservedReadings as ObservedReadings, observe as observe
-from .reading_files import AXES as AXES, read_readings as read_readings
+from .reading_files import read_readings as read_readings
 from .reading_sources import (
     Source as Source,
     SourceRows as SourceRows,

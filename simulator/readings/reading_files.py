@@ -13,6 +13,7 @@ from ballplate.simulator.design.arrays import Design, Readings, measured
 from ballplate.simulator.design.measurement import in_sequence, nominal_state
 from ballplate.simulator.design.observations.readings import expected_readings
 from ballplate.simulator.experiment.readings_section import ReadingsSettings, no_settings
+from ballplate.simulator.geometry.motions import AXIS_NAMES
 from ballplate.simulator.inputs.extensions import optional_service, service
 from ballplate.simulator.inputs.messages import (
     MORE_ERRORS,
@@ -32,8 +33,6 @@ from .joining import ReadingKey, reading_keys, rows_of
 from .observed_readings import ObservedReadings, combine_standards
 from .reading_sources import Source, source_rows
 
-AXES = ("x", "y", "z")
-
 
 def reading_columns(design: Design, readings: Readings, x: Array) -> dict[str, list[Any]]:
     """Return readings as the columns of their file: position, ball, probe, x_mm, y_mm and z_mm, NaN
@@ -45,7 +44,7 @@ def reading_columns(design: Design, readings: Readings, x: Array) -> dict[str, l
         "probe": [design.probes.names[k] for k in readings.probe],
     }
     x = np.where(measured(design, readings), x, np.nan)
-    lengths = zip(AXES[: design.dimension], (1e3 * x).T.tolist(), strict=True)
+    lengths = zip(AXIS_NAMES[: design.dimension], (1e3 * x).T.tolist(), strict=True)
     return names | {f"{axis}_mm": column for axis, column in lengths}
 
 
@@ -88,8 +87,8 @@ def read_readings(
     sources = [source] if isinstance(source, Path | GivenText) else list(source)
     messages: list[Message] = []
     beside_units = {name: unit for kind in design.influences for name, unit in kind.columns.items()}
-    units = dict.fromkeys([f"u_{axis}" for axis in AXES[:d]], LENGTH_UNITS) | beside_units
-    empty = AXES[:d] if design.positions.across is not None else ()
+    units = dict.fromkeys([f"u_{axis}" for axis in AXIS_NAMES[:d]], LENGTH_UNITS) | beside_units
+    empty = AXIS_NAMES[:d] if design.positions.across is not None else ()
 
     table = source_rows(sources, design, settings, messages, units, empty)
     # Reports state some settings themselves.
@@ -220,7 +219,7 @@ def _refuse_far_outside(rows: tuple[FileRow, ...], x: Array, design: Design) -> 
             messages.append(rows[i].mark.message("", MORE_ERRORS))
             break
         text = (
-            f"{AXES[axis]} is {x[i, axis]:.6g} m, far outside the volume; check the unit, and"
+            f"{AXIS_NAMES[axis]} is {x[i, axis]:.6g} m, far outside the volume; check the unit, and"
             " that it is a co-ordinate of the machine, not of a part (readings: coordinates)"
         )
         messages.append(rows[i].mark.message("", text))
@@ -239,11 +238,11 @@ def _where_not_read(
     messages = []
     for i, axis in np.argwhere(np.isnan(x) == is_read)[:MOST_MESSAGES].tolist():
         position = design.positions.names[readings.position[i]]
-        text = f"no {AXES[axis]}; write a number, or remove the line"
+        text = f"no {AXIS_NAMES[axis]}; write a number, or remove the line"
         if not is_read[i, axis]:
             text = (
-                f'{AXES[axis]} is across the plane of "{position}", which is read in its plane;'
-                " leave the cell empty"
+                f'{AXIS_NAMES[axis]} is across the plane of "{position}", which is read in its'
+                " plane; leave the cell empty"
             )
         messages.append(rows[i].mark.message("", text))
     if messages:

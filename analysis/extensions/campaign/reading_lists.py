@@ -13,10 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from ballplate.simulator.experiment import Experiment, lay_out
-from ballplate.simulator.geometry import ball_coordinates
+from ballplate.simulator.geometry import AXIS_NAMES, ball_coordinates
 from ballplate.simulator.inputs import DURATION_UNITS, CsvWriter, in_one_line, refused
 from ballplate.simulator.machines import Array
-from ballplate.simulator.readings import AXES
 
 from ..planning import RunSheet, Step, position_of
 
@@ -97,7 +96,7 @@ def template_csv(readings: Sequence[PlannedReading], experiment: Experiment) -> 
     """
     out = io.StringIO()
     writer = CsvWriter(out)
-    blank = [f"{axis}_mm" for axis in AXES[: experiment.dimension]]
+    blank = [f"{axis}_mm" for axis in AXIS_NAMES[: experiment.dimension]]
     for kind in lay_out(experiment).influences if experiment.influences else ():
         # Times are those of a clock.
         named = (
@@ -115,7 +114,7 @@ def points_csv(readings: Sequence[PlannedReading], dimension: int) -> str:
     """The centres as a plain table; its columns are no readings, so that `fit` refuses it."""
     out = io.StringIO()
     writer = CsvWriter(out)
-    nominal = [f"nominal_{axis}_mm" for axis in AXES[:dimension]]
+    nominal = [f"nominal_{axis}_mm" for axis in AXIS_NAMES[:dimension]]
     writer.writerow(["feature", "position", "ball", "probe", *nominal])
     for reading in readings:
         numbers = [f"{1e3 * value:.4f}" for value in reading.centre]

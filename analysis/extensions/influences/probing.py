@@ -14,7 +14,7 @@ import numpy as np
 from ballplate.simulator.design import DesignParts, Disturbed, Influence, InfluenceParameter
 from ballplate.simulator.experiment import InfluenceSettings, References
 from ballplate.simulator.geometry import Name
-from ballplate.simulator.inputs import Length, NonEmpty, Steps, hint
+from ballplate.simulator.inputs import Length, NonEmpty, Steps
 from ballplate.simulator.machines import Array, Integers
 from pydantic import Field
 
@@ -59,11 +59,7 @@ class ProbingSettings(InfluenceSettings):
             references.are_probes(self.probes, (*steps, "probes"))
         for name, direction in (self.directions or {}).items():
             place = (*steps, "directions", name)
-            references.require(
-                name in references.probes,
-                place,
-                f'unknown probe "{name}"; {hint(name, references.probes)}',
-            )
+            references.is_probe(name, place)
             if references.has_dimension(direction, place):
                 references.require(
                     any(direction), place, "has no direction; give one that is not zero"

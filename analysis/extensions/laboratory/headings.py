@@ -27,7 +27,6 @@ from .heading_words import (
 )
 from .uncertainty_headings import FACTORS, headed_uncertainty
 
-AXES = ("x", "y", "z")
 # Roles of columns of text.
 TEXTS = ("position", "ball", "probe")
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, get_args
 
+from ballplate.simulator.geometry import AXIS_NAMES
 from ballplate.simulator.inputs import (
     ExperimentError,
     Mark,
@@ -23,7 +24,7 @@ from ballplate.simulator.inputs import (
     read_text,
     shorten,
 )
-from ballplate.simulator.machines import AXES, AXIS_ERRORS
+from ballplate.simulator.machines import AXIS_ERRORS
 
 from .curve_files import BANDWIDTH, read_numbered_curves
 from .curves import Points
@@ -70,7 +71,7 @@ def parse_line(text: str) -> dict[str, float]:
     values = {}
     for part in text.split(","):
         name, equals, value = (piece.strip() for piece in part.partition("="))
-        if not equals or name not in AXES:
+        if not equals or name not in AXIS_NAMES:
             raise QuantityError(
                 f'"{shorten(part)}" is not a position of an axis; write for example y = 600 mm, z ='
                 " 200 mm"
@@ -132,7 +133,7 @@ def read_error_table(path: Path, name: str, axis: tuple[float, float] | None = N
             values[key] = KEYS[key](text)
         except QuantityError as error:
             messages.append(mark.message("", str(error)))
-    line_of, along = values.get("line", {}), AXES[AXIS_ERRORS[name].axis]
+    line_of, along = values.get("line", {}), AXIS_NAMES[AXIS_ERRORS[name].axis]
     if along in line_of:
         mark = stated_values["line"][0]
         messages.append(mark.message("", f"the line runs along {along}; leave it out"))

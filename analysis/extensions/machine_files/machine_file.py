@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from ballplate.simulator.experiment import VolumeSettings, check_ends
+from ballplate.simulator.geometry import AXIS_NAMES
 from ballplate.simulator.inputs import (
     UNKNOWN,
     ExperimentError,
@@ -29,7 +30,7 @@ from ballplate.simulator.inputs import (
     to_python,
     validated,
 )
-from ballplate.simulator.machines import AXES, arrangement_of
+from ballplate.simulator.machines import arrangement_of
 from ballplate.simulator.splines import SplineError, SplineProblem, at_every
 from pydantic import ValidationError
 
@@ -125,7 +126,7 @@ def _bare(settings: DescribedMachineSettings, problems: Problems) -> MachineDesc
             problems.add(("volume", "z"), "missing; a machine file has three axes")
             return None
         ends = [volume.x, volume.y, volume.z]
-    check_ends(dict(zip(AXES, ends, strict=True)), ("volume",), problems)
+    check_ends(dict(zip(AXIS_NAMES, ends, strict=True)), ("volume",), problems)
     # What else is wrong is told with the ends exchanged, or without any.
     ends = [
         (min(pair), max(pair)) if pair[0] != pair[1] else (-math.inf, math.inf) for pair in ends
@@ -320,9 +321,11 @@ def _line(
 ) -> Three | None:
     if values is None:
         return None
-    if AXES[axis] in values:
+    if AXIS_NAMES[axis] in values:
         problems.add(
-            (*steps, AXES[axis]), f"the line runs along {AXES[axis]}; leave it out", of_key=True
+            (*steps, AXIS_NAMES[axis]),
+            f"the line runs along {AXIS_NAMES[axis]}; leave it out",
+            of_key=True,
         )
         return None
     line = _complete(values, machine, axis)
@@ -336,7 +339,7 @@ def _complete(values: dict[str, float], machine: MachineDescription, axis: int) 
         return None
     x, y, z = (
         values.get(key, machine.reference[k]) if k != axis else machine.reference[k]
-        for k, key in enumerate(AXES)
+        for k, key in enumerate(AXIS_NAMES)
     )
     return x, y, z
 
@@ -348,7 +351,7 @@ def _inside(
     for k, value in enumerate(point or ()):
         if not machine.lower[k] <= value <= machine.upper[k]:
             text = (
-                f"{AXES[k]} = {format_length(value)} is outside the volume"
+                f"{AXIS_NAMES[k]} = {format_length(value)} is outside the volume"
                 f" ({format_length(machine.lower[k])} to {format_length(machine.upper[k])});"
                 " correct one of the two"
             )
@@ -360,5 +363,7 @@ def _inside(
 def _check_table(
     on_table: bool, machine: MachineDescription, axis: int, steps: Steps, problems: Problems
 ) -> None:
-    if on_table and AXES[axis] not in machine.arrangement.workpiece_side:
-        problems.add(steps, f"the {AXES[axis]} axis moves no table; leave straightedge: table out")
+    if on_table and AXIS_NAMES[axis] not in machine.arrangement.workpiece_side:
+        problems.add(
+            steps, f"the {AXIS_NAMES[axis]} axis moves no table; leave straightedge: table out"
+        )

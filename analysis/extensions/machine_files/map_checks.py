@@ -9,6 +9,7 @@ import numpy as np
 from ballplate.results import LackOfFit
 from ballplate.simulator.design import Probes, Volume
 from ballplate.simulator.experiment import MapData, check_ends, check_installed
+from ballplate.simulator.geometry import AXIS_NAMES
 from ballplate.simulator.inputs import (
     ExperimentError,
     Mapping as MappingNode,
@@ -31,7 +32,7 @@ from ballplate.simulator.machines import (
 )
 
 from .fitted_map import FittedMap, LeftOut
-from .map_content import AXES, checksum_of
+from .map_content import checksum_of
 from .map_sections import MapSettings
 from .model_files import absolute, fingerprints
 
@@ -159,7 +160,7 @@ def _probes(settings: MapSettings, d: int, problems: Problems) -> Probes | None:
     """The probes, or None after reporting faults."""
     for name, probe in settings.probes.items():
         if {len(probe.offset), len(probe.nominal or probe.offset)} != {d} or any(
-            AXES.index(axis) >= d for axis in probe.estimated
+            AXIS_NAMES.index(axis) >= d for axis in probe.estimated
         ):
             problems.add(("probes", name), f"is not of {d} axes, as the volume")
     if len(settings.repeatability) != d:
@@ -170,7 +171,7 @@ def _probes(settings: MapSettings, d: int, problems: Problems) -> Probes | None:
     if problems.messages:
         return None
     free = [
-        [axis in probe_settings.estimated for axis in AXES[:d]]
+        [axis in probe_settings.estimated for axis in AXIS_NAMES[:d]]
         for probe_settings in settings.probes.values()
     ]
     offsets = np.array([probe_settings.offset for probe_settings in settings.probes.values()])

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 from ballplate.results import verdict_content
 from ballplate.simulator.experiment import MapData
+from ballplate.simulator.geometry import AXIS_NAMES
 from ballplate.simulator.inputs import provider, shipped, to_list
 from ballplate.simulator.machines import KINDS, Array
 
 from .fitted_map import FittedMap
 from .model_files import fingerprints, relative
 
-AXES = ("x", "y", "z")
 # What is not hashed: it may be corrected by hand.
 WORDS = ("title", "experiment", "date", "program", "frame", "checksum")
 
@@ -36,7 +36,7 @@ def head_of(fitted: FittedMap, folder: Path) -> dict[str, Any]:
         "files": fingerprints(fitted.settings),
         "volume": {
             axis: [_length(low), _length(high)]
-            for axis, low, high in zip(AXES, lower, upper, strict=False)
+            for axis, low, high in zip(AXIS_NAMES, lower, upper, strict=False)
         },
         "frame": fitted.frame,
         "repeatability": [_length(component) for component in fitted.repeatability.tolist()],
@@ -85,7 +85,7 @@ def _probe_data(fitted: FittedMap) -> dict[str, Any]:
         }
         if fitted.probes.free[k].any():
             data[name] |= {
-                "estimated": [AXES[axis] for axis in np.flatnonzero(fitted.probes.free[k])],
+                "estimated": [AXIS_NAMES[axis] for axis in np.flatnonzero(fitted.probes.free[k])],
                 "nominal": [_length(component) for component in fitted.drawn_offsets[k].tolist()],
             }
     return data

@@ -7,10 +7,10 @@ from typing import Literal
 import numpy as np
 from ballplate.simulator.design import Machine
 from ballplate.simulator.experiment import References
+from ballplate.simulator.geometry import AXIS_NAMES
 from ballplate.simulator.inputs import ExperimentError, NonEmpty, format_length, listing
 from ballplate.simulator.machines import (
     ARRANGEMENT,
-    AXES,
     AXIS_ERRORS,
     PRODUCTS,
     ArrangementName,
@@ -98,8 +98,8 @@ def read(truth: CurvesSettings, machine: Machine | None, references: References)
             text = (
                 f"covers {format_length(points.positions[0])} to"
                 f" {format_length(points.positions[-1])}, but machine.volume is"
-                f" {format_length(lower)} to {format_length(upper)} in {AXES[axis]}; cover most of"
-                " it"
+                f" {format_length(lower)} to {format_length(upper)} in {AXIS_NAMES[axis]}; cover"
+                " most of it"
             )
             problems.add(steps, text)
     return truth.completed(_curves=curves)

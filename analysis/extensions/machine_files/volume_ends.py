@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from ballplate.simulator.design import Machine
 from ballplate.simulator.experiment import References
+from ballplate.simulator.geometry import AXIS_NAMES
 from ballplate.simulator.inputs import Steps, format_length
-from ballplate.simulator.machines import AXES
 
 # Ends that are the same, in metres.
 TOLERANCE = 1e-9
@@ -28,7 +28,7 @@ def check_within(
     outer = [*zip(lower, upper, strict=True)]
     inner = [*zip(machine.volume.lower.tolist(), machine.volume.upper.tolist(), strict=True)]
     is_right = True
-    for axis, ends, (low, high) in zip(AXES, outer, inner, strict=False):
+    for axis, ends, (low, high) in zip(AXIS_NAMES, outer, inner, strict=False):
         beyond = ends[0] - low, high - ends[1]
         if max(map(abs, beyond) if is_same else beyond) > TOLERANCE:
             text = (

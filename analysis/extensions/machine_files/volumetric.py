@@ -12,8 +12,8 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
+from ballplate.simulator.geometry import AXIS_NAMES
 from ballplate.simulator.machines import (
-    AXES,
     ERRORS,
     SQUARENESS_ERRORS,
     Array,
@@ -79,8 +79,8 @@ def thermal_field(axis: int) -> Field:
     deviation.
     """
     exponents = int(axis == 0), int(axis == 1), int(axis == 2)
-    meaning = f"thermal expansion along {AXES[axis]}"
-    return Field(f"thermal {AXES[axis]}", "1", meaning, ((axis, 1.0, exponents),))
+    meaning = f"thermal expansion along {AXIS_NAMES[axis]}"
+    return Field(f"thermal {AXIS_NAMES[axis]}", "1", meaning, ((axis, 1.0, exponents),))
 
 
 def droop_field(arrangement: str, name: str, length: float) -> Field:

@@ -10,15 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from ballplate.presentation import SHOWN, number
 from ballplate.simulator.computing import single_threaded
+from ballplate.simulator.geometry import AXIS_NAMES
 from ballplate.simulator.inputs import format_length, hint
-from ballplate.simulator.machines import (
-    AXES,
-    SQUARENESS_ERRORS,
-    Array,
-    HasLines,
-    SquarenessError,
-    Unit,
-)
+from ballplate.simulator.machines import SQUARENESS_ERRORS, Array, HasLines, SquarenessError, Unit
 
 from ..machine_files import FittedMap, meaning
 from .volumetric_errors import AlongAxis, Volumetric, along_axes
@@ -139,7 +133,7 @@ def _stated_as(along: AlongAxis) -> str:
     if error.line is not None and not error.is_rotation:
         fixed_axes = [k for k in range(3) if k != error.axis]
         form += " at " + ", ".join(
-            f"{AXES[k]} = {format_length(error.line[k])}" for k in fixed_axes
+            f"{AXIS_NAMES[k]} = {format_length(error.line[k])}" for k in fixed_axes
         )
     return form + (f", {error.criterion}" if error.is_straightness else "")
 

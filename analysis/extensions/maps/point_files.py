@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 from ballplate.simulator.design import Volume
+from ballplate.simulator.geometry import AXIS_NAMES
 from ballplate.simulator.inputs import (
     MORE_ERRORS,
     MOST_MESSAGES,
@@ -21,7 +22,6 @@ from ballplate.simulator.inputs import (
 )
 from ballplate.simulator.machines import Array, Integers
 
-AXES = ("x", "y", "z")
 # Columns of text that a file may have; the first three name its points.
 NAMING, PROBE = ("name", "position", "ball"), "probe"
 
@@ -66,7 +66,7 @@ def read_points(
     d = len(volume.lower)
     there = header_names(source)
     texts = tuple(name for name in (*NAMING, PROBE) if name in there)
-    rows = read_table(source, texts, AXES[:d])
+    rows = read_table(source, texts, AXIS_NAMES[:d])
     points = np.array([row.lengths for row in rows])
     messages: list[Message] = []
     probe_indices = {name: k for k, name in enumerate(probes)}
@@ -79,7 +79,9 @@ def read_points(
                 row.mark.message("", f'unknown probe "{name}"; {hint(name, probe_indices)}')
             )
     for i, axis in np.argwhere(volume.far_outside(points)).tolist():
-        text = f"{AXES[axis]} is {points[i, axis]:.6g} m, far outside the volume; check the unit"
+        text = (
+            f"{AXIS_NAMES[axis]} is {points[i, axis]:.6g} m, far outside the volume; check the unit"
+        )
         messages.append(rows[i].mark.message("", text))
         if len(messages) >= MOST_MESSAGES:
             messages.append(rows[i].mark.message("", MORE_ERRORS))

@@ -14,8 +14,8 @@ from typing import Literal
 
 import numpy as np
 from ballplate.simulator.design import Volume
+from ballplate.simulator.geometry import AXIS_NAMES
 from ballplate.simulator.machines import (
-    AXES,
     Array,
     KinematicModel,
     Parameter,
@@ -139,7 +139,7 @@ class Volumetric:
             if temperature.uncertainty:
                 fields.append(
                     (
-                        thermal_field(AXES.index(axis)),
+                        thermal_field(AXIS_NAMES.index(axis)),
                         abs(temperature.expansion) * temperature.uncertainty,
                     )
                 )

@@ -322,10 +322,6 @@ def _hours(seconds: float) -> str:
     return f"{seconds / HOUR:.2f}"
 
 
-def _micrometres(value: float) -> str:
-    return number(1e6 * value)
-
-
 def _value(campaign: Campaign, value: float) -> list[str]:
     if math.isinf(value):
         return ["-", "deficient"]
