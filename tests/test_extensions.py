@@ -40,6 +40,8 @@ BUILDS_ON = {
     ("campaign", "planning"): "run sheets are of the steps of a plan, and plans begun are read",
     ("requirements", "planning"): "the hours that meet a target are those of plans",
     ("repair", "planning"): "what repairs a design is chosen as positions of a plan are",
+    ("drafting", "planning"): "the hours of a draft's positions are those of plans",
+    ("repair", "drafting"): "a design is compared with the strategies of drafts",
     ("studio", "planning"): "the studio plans",
     ("pages", "campaign"): "the page of a design has its run sheet",
     ("pages", "maps"): "the page of a design has its map of lengths",
