@@ -24,7 +24,8 @@ LETTERS = 12
 @dataclass(frozen=True, eq=False)
 class Trace:
     """Values `y` (m,) over `x` (m,), possibly NaN: a line, dots, or a band up to `upper` (m,).
-    `style` is a class of the page.
+    `style` is a class of the page. `notes` are, for each dot, its text and the id of the element
+    that it leads to, which may be empty.
     """
 
     kind: str
@@ -32,12 +33,14 @@ class Trace:
     x: Array
     y: Array
     upper: Array | None = None
+    notes: Sequence[tuple[str, str]] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class Chart:
     """Traces over two axes. `places` are names along the first axis instead of numbers, each with
-    its co-ordinate; `words` describe the chart for those who do not see it.
+    its co-ordinate; `marked` are the only numbers to mark there; `words` describe the chart for
+    those who do not see it.
     """
 
     traces: Sequence[Trace]
@@ -47,18 +50,20 @@ class Chart:
     places: Sequence[tuple[float, str]] = ()
     from_zero: bool = False
     height: float = HEIGHT
+    width: float = WIDTH
+    marked: Sequence[float] = ()
 
 
 def chart_svg(chart: Chart) -> Html:
     """The chart as an element of a page."""
     horizontal, vertical = _limits(chart)
-    scale = _Scale(horizontal, vertical, chart.height)
+    scale = _Scale(horizontal, vertical, chart.height, chart.width)
     parts = [*_grid(chart, scale), *(_trace(trace, scale) for trace in chart.traces)]
     return element(
         "svg",
         joined(parts),
-        class_="chart",
-        viewBox=f"0 0 {WIDTH:g} {chart.height:g}",
+        class_="chart" if chart.width == WIDTH else "chart full",
+        viewBox=f"0 0 {chart.width:g} {chart.height:g}",
         role="img",
         aria_label=chart.words,
     )
@@ -69,10 +74,15 @@ class _Scale:
     across: tuple[float, float]
     up: tuple[float, float]
     height: float
+    width: float
+
+    @property
+    def right(self) -> float:
+        return self.width - RIGHT
 
     def x(self, values: Array) -> Array:
         low, high = self.across
-        return np.asarray(LEFT + (values - low) / (high - low) * (WIDTH - LEFT - RIGHT))
+        return np.asarray(LEFT + (values - low) / (high - low) * (self.right - LEFT))
 
     def y(self, values: Array) -> Array:
         low, high = self.up
@@ -92,7 +102,9 @@ def _limits(chart: Chart) -> tuple[tuple[float, float], tuple[float, float]]:
     if chart.places:
         return (-0.5, len(chart.places) - 0.5), vertical
     low, high = _ends(across)
-    return (low, high if high > low else low + 1.0), vertical
+    # Dots that lead to something are not cut by the frame.
+    beside = 0.02 * (high - low) * any(trace.notes for trace in chart.traces)
+    return (low - beside, high + beside if high > low else low + 1.0), vertical
 
 
 def _ends(values: Array) -> tuple[float, float]:
@@ -119,17 +131,17 @@ def _grid(chart: Chart, scale: _Scale) -> list[Html]:
         ticks(*scale.up), scale.y(np.array(ticks(*scale.up))).tolist(), strict=True
     ):
         kind = "zero" if value == 0.0 and scale.up[0] < 0.0 else "grid"
-        lines.append(_path(f"M{LEFT:g} {y:.1f}H{WIDTH - RIGHT:g}", kind))
+        lines.append(_path(f"M{LEFT:g} {y:.1f}H{scale.right:g}", kind))
         texts.append(_text(LEFT - 5, y + 3.5, f"{value:g}", "end"))
     if chart.places:
         for x, name in _shown_places(chart, scale):
             texts.append(_text(x, bottom + 13, name, "middle"))
     else:
-        values = ticks(*scale.across)
+        values = chart.marked or ticks(*scale.across)
         for value, x in zip(values, scale.x(np.array(values)).tolist(), strict=True):
             lines.append(_path(f"M{x:.1f} {ABOVE:g}V{bottom:g}", "grid"))
             texts.append(_text(x, bottom + 13, f"{value:g}", "middle"))
-    texts.append(_text((LEFT + WIDTH - RIGHT) / 2, bottom + 28, chart.across, "middle"))
+    texts.append(_text((LEFT + scale.right) / 2, bottom + 28, chart.across, "middle"))
     middle = ABOVE + (bottom - ABOVE) / 2
     turned = f"rotate(-90 11 {middle:g})"
     texts.append(element("text", chart.up, x=11, y=middle, text_anchor="middle", transform=turned))
@@ -139,12 +151,11 @@ def _grid(chart: Chart, scale: _Scale) -> list[Html]:
 def _shown_places(chart: Chart, scale: _Scale) -> list[tuple[float, str]]:
     """Return names along the axis if they fit, otherwise some of their numbers."""
     where = scale.x(np.array([x for x, _ in chart.places])).tolist()
-    room = (WIDTH - LEFT - RIGHT) / max(len(where), 1)
+    room = (scale.right - LEFT) / max(len(where), 1)
     longest = max(len(name) for _, name in chart.places)
     if 5.6 * min(longest, LETTERS) < room:
-        names = [
-            name if len(name) <= LETTERS else f"{name[: LETTERS - 1]}…" for _, name in chart.places
-        ]
+        most = max(LETTERS, int(room / 5.6))
+        names = [name if len(name) <= most else f"{name[: most - 1]}…" for _, name in chart.places]
         return list(zip(where, names, strict=True))
     every = -(-24 // max(int(room), 1))
     return [(x, str(k + 1)) for k, x in enumerate(where) if k % every == 0]
@@ -156,6 +167,9 @@ def _trace(trace: Trace, scale: _Scale) -> Html:
         is_finite &= np.isfinite(trace.upper)
     x, y = np.round(scale.x(trace.x), 1).tolist(), np.round(scale.y(trace.y), 1).tolist()
     runs = _runs(is_finite)
+    if trace.notes:
+        dots = (_noted(x[k], y[k], trace.style, *trace.notes[k]) for run in runs for k in run)
+        return joined(dots)
     if trace.kind == "dots":
         path = "".join(f"M{x[k]:g} {y[k]:g}h0" for run in runs for k in run)
     elif trace.upper is not None:
@@ -171,6 +185,12 @@ def _trace(trace: Trace, scale: _Scale) -> Html:
     else:
         path = "".join(_line([x[k] for k in run], [y[k] for k in run]) for run in runs)
     return _path(path, f"{trace.kind} {trace.style}")
+
+
+def _noted(x: float, y: float, style: str, words: str, target: str) -> Html:
+    """A dot with its text. Tables have the links for those who use no pointer."""
+    parts = element("title", words), _path(f"M{x:g} {y:g}h0", f"dots noted {style}")
+    return element("a", *parts, href=f"#{target}", tabindex=-1) if target else element("g", *parts)
 
 
 def _runs(is_finite: np.ndarray) -> list[list[int]]:

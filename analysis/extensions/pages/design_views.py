@@ -18,9 +18,10 @@ OUT = np.array([[0.0, -0.5, -0.85], [0.7, 0.0, -0.7], [-0.9, -0.9, 0.0]])
 THICKNESS = 0.014
 
 
-def volume_layers(design: Design) -> list[Layer]:
-    """The volume with the names of its axes, ticks in millimetres, and the origin."""
-    lower, upper = design.machine.volume.lower, design.machine.volume.upper
+def volume_layers(lower: Array, upper: Array) -> list[Layer]:
+    """The volume between two corners (d,) with the names of its axes, ticks in millimetres, and the
+    origin.
+    """
     d = len(lower)
     _, away = projection(d)
     edges, hidden = box_edges(lower, upper, away)
@@ -70,44 +71,66 @@ def _ticks(low: float, high: float) -> list[float]:
 def volume_view(design: Design) -> SpatialPicture:
     """Positions in the volume, the balls that are read, some of each position, and styli."""
     where = locations(design, nominal_state(design), design.readings)
-    layers = volume_layers(design)
-    (_, up), _ = projection(design.dimension)
-    thickness = THICKNESS * float(design.machine.volume.size.max())
-    labels, names, styli = [], [], []
+    volume = design.machine.volume
+    layers = volume_layers(volume.lower, volume.upper)
+    outlines, styli = [], []
     positions_read = [
         k for k in range(len(design.positions.names)) if (design.readings.position == k).any()
     ]
     position_names = [design.positions.names[k] for k in positions_read]
-    is_named = names_fit(position_names)
-    for number, k in enumerate(positions_read):
+    for k in positions_read:
         mine = np.flatnonzero(design.readings.position == k)
         balls = where[mine]
-        outline = _outline(balls)
-        if len(outline) > 2:
-            layers.append(Layer("areas", "plate", outline, (len(outline),)))
-        layers.append(_edges(outline, thickness))
+        outlines.append(_outline(balls))
+        layers += _plate(outlines[-1], volume.size)
         layers.append(Layer("dots", "plate", balls[_some(design.readings.ball[mine])]))
         middle = balls[np.linalg.norm(balls - balls.mean(axis=0), axis=1).argmin()]
         offsets = design.probes.offsets[np.unique(design.readings.probe[mine])]
         styli += [np.stack([middle, middle - offset]) for offset in offsets if offset.any()]
-        # Plates in a plane do not hide one another's middle.
-        centre, top = outline.mean(axis=0), outline[(outline @ up).argmax()]
-        labels.append(centre if design.dimension == 2 else top + 0.12 * (top - centre))
-        names.append(position_names[number] if is_named else str(number + 1))
     if styli:
         layers.append(Layer("lines", "ink fine", np.concatenate(styli), (2,) * len(styli)))
         layers.append(Layer("dots", "ink", np.stack([stylus[1] for stylus in styli])))
-    layers.append(Layer("labels", "names", np.array(labels), names=tuple(names)))
+    layers.append(_names(position_names, outlines))
     words = f"{len(positions_read)} positions in the volume, which the run sheet lists"
     caption = (
         "Positions in the volume: balls that are read, and from one ball of each position the styli"
         " to the machine's reference point."
     )
-    if not is_named:
+    if not names_fit(position_names):
         caption += " Positions are numbered as in the run sheet."
     if len(design.readings.ball) and max(_counts(design)) > MOST_BALLS:
         caption += " Only some of the balls are drawn."
     return SpatialPicture(layers, words, caption)
+
+
+def plates_view(
+    lower: Array, upper: Array, positions: Sequence[tuple[str, Array]], words: str, caption: str
+) -> SpatialPicture:
+    """Return plates in the volume between two corners (d,) by the name of each position and points
+    (k, d) at the edge of its plate.
+    """
+    outlines = [_outline(points) for _, points in positions]
+    plates = [layer for outline in outlines for layer in _plate(outline, upper - lower)]
+    names = _names([name for name, _ in positions], outlines)
+    return SpatialPicture([*volume_layers(lower, upper), *plates, names], words, caption)
+
+
+def _names(names: Sequence[str], outlines: Sequence[Array]) -> Layer:
+    """The names of positions at their plates, or their numbers if names do not fit."""
+    labels = []
+    for outline in outlines:
+        (_, up), _ = projection(outline.shape[1])
+        # Plates in a plane do not hide one another's middle.
+        centre, top = outline.mean(axis=0), outline[(outline @ up).argmax()]
+        labels.append(centre if len(up) == 2 else top + 0.12 * (top - centre))
+    shown = tuple(names) if names_fit(names) else tuple(str(k + 1) for k in range(len(names)))
+    return Layer("labels", "names", np.array(labels), names=shown)
+
+
+def _plate(outline: Array, size: Array) -> list[Layer]:
+    """The plate of an outline (k, d) in a volume of a `size` (d,)."""
+    areas = [Layer("areas", "plate", outline, (len(outline),))] if len(outline) > 2 else []
+    return [*areas, _edges(outline, THICKNESS * float(size.max()))]
 
 
 def _edges(outline: Array, thickness: float) -> Layer:

@@ -18,6 +18,7 @@ from .cases import SweepCases, column_unit
 # Cases in the table of the best.
 LISTED = 8
 
+OBSERVATIONS = "observations"
 WITHIN = "U6_within_target"
 
 # Quantities to judge cases by: the average of the first that is recorded.
@@ -29,13 +30,15 @@ CRITERIA = (*PREFERRED, *(symbol for symbol in RECORDED if symbol not in PREFERR
 class SweepAnswer:
     """Sentences, and the rows of the best cases, best first; `case` is the number of the best.
 
-    `is_good` unless no case meets an existing target.
+    `is_good` unless no case meets an existing target; `outstanding` are rows to show first, each
+    with the reason.
     """
 
     sentences: tuple[str, ...]
     best: tuple[int, ...]
     case: int
     is_good: bool
+    outstanding: dict[int, str]
 
 
 def answer(result: SweepCases) -> SweepAnswer | None:
@@ -43,23 +46,78 @@ def answer(result: SweepCases) -> SweepAnswer | None:
     column, done = criterion(result), np.flatnonzero(result.done)
     if column is None or not len(done):
         return None
-    value, observations = result.figure(column)[done], result.figure("observations")[done]
-    partly = ~np.isfinite(value)
-    share = result.figure(WITHIN)[done]
-    meets = share == 1.0
-    if np.isfinite(share).any():
-        sentences = _sentences_with_target(result, done, column, share, observations, value)
-        order = (
-            best_first(~meets, observations, value) if meets.any() else best_first(-share, value)
-        )
+    value, share = result.figure(column)[done], result.figure(WITHIN)[done]
+    meets, partly = share == 1.0, ~np.isfinite(value)
+    has_target = bool(np.isfinite(share).any())
+    unit, cost = _cost(result, done, meets)
+    if has_target:
+        sentences = _sentences_with_target(result, done, column, share, (unit, cost), value)
+        order = best_first(~meets, cost, value) if meets.any() else best_first(-share, value)
     else:
         sentences = _sentences_without_target(result, done, column, value, partly)
         order = best_first(partly, value)
     sentences += [f"Given {text}." for text in _with_cases(result, "given")]
     sentences += _sentences_on_others(result, done)
-    is_good = bool(meets.any()) or not np.isfinite(share).any()
     best = tuple(done[order[:LISTED]].tolist())
-    return SweepAnswer(tuple(sentences), best, int(result.table["cell"][best[0]]), is_good)
+    found = _outstanding(done, column, value, share, (unit, cost), int(order[0]))
+    case, is_good = int(result.table["cell"][best[0]]), bool(meets.any()) or not has_target
+    return SweepAnswer(tuple(sentences), best, case, is_good, found)
+
+
+def _outstanding(
+    done: Integers, column: str, value: Array, share: Array, costs: tuple[str, Array], first: int
+) -> dict[int, str]:
+    """Return the rows of the case with the smallest average and of that at the `first` place, with
+    the reasons.
+    """
+    reasons: dict[int, str] = {}
+    (unit, cost), meets, known = costs, share == 1.0, np.isfinite(value)
+    if known.any():
+        least, alike = _first_of_best(value, np.flatnonzero(known))
+        # Of equal cases, the one that heads the list.
+        least = first if (comparable(value) == comparable(value)[least])[first] else least
+        of_known = "" if known.all() else " of the cases that determine it"
+        words = f"smallest average of {quantity(column)}{of_known}{_as_have(alike)}"
+        reasons[int(done[least])] = words
+    words = ""
+    if meets.any() and np.isfinite(cost[first]):
+        words = f"fewest {unit} of the cases that meet the target"
+        words += _as_have(int((cost[meets] == cost[first]).sum()) - 1)
+    elif np.isfinite(share).any() and not meets.any():
+        words = f"nearest to the target{_as_have(int((share == share[first]).sum()) - 1)}"
+    if words:
+        row = int(done[first])
+        reasons[row] = "; ".join(filter(None, [reasons.get(row), words]))
+    return reasons
+
+
+def _cost(result: SweepCases, done: Integers, meets: Flags) -> tuple[str, Array]:
+    """Return what the cases that meet the target are compared by, and its values (m,): hours if
+    known for any of them.
+    """
+    hours = result.figure("hours")[done]
+    if np.isfinite(hours[meets]).any():
+        return "laboratory hours", comparable(hours)
+    return OBSERVATIONS, result.figure(OBSERVATIONS)[done]
+
+
+def _as_have(alike: int) -> str:
+    """Return that further cases are equal to one."""
+    return f", as {_verb(alike, 'have')} {alike} more" if alike else ""
+
+
+def described(result: SweepCases, row: int, column: str) -> str:
+    """Return a case in a line: number, values of the axes, and figures."""
+    value, share = result.figure(column)[row], result.figure(WITHIN)[row]
+    parts = [
+        _with_value(column, value) if np.isfinite(value) else f"{quantity(column)} undetermined"
+    ]
+    if np.isfinite(share):
+        parts.append(f"{percent(float(share))} of the lengths within target")
+    for name in ("positions", "observations", "hours"):
+        if np.isfinite(count := result.figure(name)[row]):
+            parts.append(f"{number(count) if name == 'hours' else int(count)} {name}")
+    return f"case {result.table['cell'][row]}: {'; '.join([result.words(row), *parts])}"
 
 
 def criterion(result: SweepCases) -> str | None:
@@ -93,7 +151,7 @@ def _sentences_with_target(
     done: Integers,
     column: str,
     share: Array,
-    observations: Array,
+    costs: tuple[str, Array],
     value: Array,
 ) -> list[str]:
     """Return sentences on cases with a target, which may be an axis of the sweep."""
@@ -103,7 +161,7 @@ def _sentences_with_target(
         sentences = [
             f"{meets.sum()} of {_cases(judged)} {_verb(int(meets.sum()), 'meet')} the target"
             " uncertainty with all lengths.",
-            _cheapest_sentence(result, done, column, np.flatnonzero(meets), observations, value),
+            _cheapest_sentence(result, done, column, np.flatnonzero(meets), *costs, value),
         ]
     else:
         best = best_first(-share, value)[0]
@@ -128,25 +186,32 @@ def _cheapest_sentence(
     done: Integers,
     column: str,
     candidates: Integers,
-    observations: Array,
+    unit: str,
+    cost: Array,
     value: Array,
 ) -> str:
-    """Return a sentence on the case with the fewest observations and, among those, the smallest
+    """Return a sentence on the case with the least cost in a unit and, among those, the smallest
     average.
     """
-    counted = candidates[np.isfinite(observations[candidates])]
+    counted = candidates[np.isfinite(cost[candidates])]
     if not len(counted):
-        return "Their numbers of observations are not recorded."
-    fewest = counted[observations[counted] == observations[counted].min()]
+        return f"Their numbers of {unit} are not recorded."
+    least = cost[counted].min()
+    fewest = counted[cost[counted] == least]
     best, same = _first_of_best(value, fewest)
-    name, count = result.words(done[best]), f"{observations[best]:.0f} observations"
+    name, amount = (
+        result.words(done[best]),
+        number(least) if unit != OBSERVATIONS else f"{least:.0f}",
+    )
+    unknown = len(candidates) - len(counted)
+    more = f" Those of {_cases(unknown)} more that {_verb(unknown, 'meet')} it are unknown."
+    more = more if unknown else ""
     if len(fewest) == 1:
-        return f"The one with the fewest observations is {name}: {count}."
-    tied = f", as {_verb(same, 'have')} {same} more" if same else ""
+        return f"The one with the fewest {unit} is {name}: {amount} {unit}.{more}"
     return (
-        f"The fewest observations are {observations[best]:.0f}, in {len(fewest)} of these cases."
+        f"The fewest {unit} are {amount}, in {len(fewest)} of these cases."
         f" Among these, {name} has the smallest average of {_with_value(column, value[best])}"
-        f"{tied}."
+        f"{_as_have(same)}.{more}"
     )
 
 

@@ -35,6 +35,10 @@ SHOWN = {
     "spread_ratio": "spread / U",
     "coverage_sigma_given": "covered, %",
 }
+# Counts, and what a case costs, with headings.
+WHOLE_NUMBERS = ("positions", "readings", "observations", "rank deficiency")
+COUNTS = {name.replace(" ", "_"): name for name in WHOLE_NUMBERS}
+COUNTS |= {"hours": "hours", "bound_m": "bound, µm"}
 IN_TEXT = ("average", "within_target")
 FIGURE = re.compile(rf"(.+?)_({'|'.join(SHOWN)})(?:_(m|rad|m_or_rad|ratio))?")
 # Quantities, without their parts.
@@ -89,7 +93,10 @@ class SweepCases:
 
     def figure(self, name: str) -> Array:
         """Return a column of the table (rows,); NaN if it is not recorded."""
-        if name not in self.table:
+        # Axes of earlier stores may have names that are figures now.
+        if name not in self.table or any(
+            name == axis["column"] for axis in self.definition["axes"]
+        ):
             return np.full(len(self.table), math.nan)
         return np.asarray(self.table[name], float)
 
@@ -110,7 +117,7 @@ class SweepCases:
 def columns_of(
     result: SweepCases, rows: Iterable[int], shown: Collection[str] = SHOWN
 ) -> list[tuple[str, list[Any]]]:
-    """Return columns of some rows: axes, rank, the values `shown`, and what these take for
+    """Return columns of some rows: axes, costs, rank, the values `shown`, and what these take for
     granted.
     """
     table, chosen = result.table.iloc[list(rows)], result.chosen[list(rows)]
@@ -120,10 +127,12 @@ def columns_of(
     ]
     if not result.done.all():
         columns.append(("status", table["status"].tolist()))
-    for name in ("observations", "rank_deficiency"):
-        if (result.figure(name) > 0).any():
-            values = [None if math.isnan(v) else int(v) for v in result.figure(name)[table.index]]
-            columns.append((name.replace("_", " "), values))
+    for name, heading in COUNTS.items():
+        found = result.figure(name)
+        if (found > 0).any():
+            form = int if heading in WHOLE_NUMBERS else float
+            values = [None if math.isnan(v) else form(v) for v in found[table.index].tolist()]
+            columns.append((heading, values))
     for name in table.columns:
         match = FIGURE.fullmatch(name)
         if match is None or match[2] not in shown or match[1].removesuffix("_more") not in WHOLE:
@@ -161,11 +170,11 @@ def _axis(stored: dict[str, Any]) -> ShownAxis:
     name, labels = in_one_line(stored["name"]), tuple(map(in_one_line, stored["labels"]))
     if not stored["unit"]:
         return ShownAxis(name, labels, (), "")
+    unit = "" if stored["unit"] == "1" else stored["unit"]
     # The unit as written, if common to all values; otherwise metres or radians.
     matches = [QUANTITY.fullmatch(label.strip()) for label in labels]
     units = {(match[2] or "").strip() for match in matches if match is not None}
     if len(units) == 1 and all(matches):
         numbers = tuple(float(exact_number(match[1])) for match in matches if match is not None)
-        return ShownAxis(name, labels, numbers, units.pop())
-    unit = "" if stored["unit"] == "1" else stored["unit"]
+        return ShownAxis(name, labels, numbers, units.pop() or unit)
     return ShownAxis(name, labels, tuple(map(float, stored["values"])), unit)
