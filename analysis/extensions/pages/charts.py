@@ -39,8 +39,7 @@ class Trace:
 @dataclass(frozen=True, eq=False)
 class Chart:
     """Traces over two axes. `places` are names along the first axis instead of numbers, each with
-    its co-ordinate; `marked` are the only numbers to mark there; `words` describe the chart for
-    those who do not see it.
+    its co-ordinate; `words` describe the chart for those who do not see it.
     """
 
     traces: Sequence[Trace]
@@ -51,7 +50,6 @@ class Chart:
     from_zero: bool = False
     height: float = HEIGHT
     width: float = WIDTH
-    marked: Sequence[float] = ()
 
 
 def chart_svg(chart: Chart) -> Html:
@@ -99,12 +97,13 @@ def _limits(chart: Chart) -> tuple[tuple[float, float], tuple[float, float]]:
     low = min(ends[0], 0.0) if chart.from_zero else ends[0]
     room = 0.06 * ((ends[1] - low) or abs(low) or 1.0)
     vertical = (0.0 if chart.from_zero and low >= 0.0 else low - room, ends[1] + room)
-    if chart.places:
-        return (-0.5, len(chart.places) - 0.5), vertical
     low, high = _ends(across)
-    # Dots that lead to something are not cut by the frame.
-    beside = 0.02 * (high - low) * any(trace.notes for trace in chart.traces)
-    return (low - beside, high + beside if high > low else low + 1.0), vertical
+    if chart.places:
+        where = np.sort([x for x, _ in chart.places])
+        half = 0.5 * float(np.diff(where).min(initial=np.inf))
+        half = half if math.isfinite(half) else 0.5
+        return (float(where[0]) - half, float(where[-1]) + half), vertical
+    return (low, high if high > low else low + 1.0), vertical
 
 
 def _ends(values: Array) -> tuple[float, float]:
@@ -137,7 +136,7 @@ def _grid(chart: Chart, scale: _Scale) -> list[Html]:
         for x, name in _shown_places(chart, scale):
             texts.append(_text(x, bottom + 13, name, "middle"))
     else:
-        values = chart.marked or ticks(*scale.across)
+        values = ticks(*scale.across)
         for value, x in zip(values, scale.x(np.array(values)).tolist(), strict=True):
             lines.append(_path(f"M{x:.1f} {ABOVE:g}V{bottom:g}", "grid"))
             texts.append(_text(x, bottom + 13, f"{value:g}", "middle"))

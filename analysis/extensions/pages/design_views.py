@@ -72,65 +72,58 @@ def volume_view(design: Design) -> SpatialPicture:
     """Positions in the volume, the balls that are read, some of each position, and styli."""
     where = locations(design, nominal_state(design), design.readings)
     volume = design.machine.volume
-    layers = volume_layers(volume.lower, volume.upper)
-    outlines, styli = [], []
-    positions_read = [
-        k for k in range(len(design.positions.names)) if (design.readings.position == k).any()
-    ]
-    position_names = [design.positions.names[k] for k in positions_read]
-    for k in positions_read:
+    balls, styli, positions = [], [], []
+    for k, name in enumerate(design.positions.names):
         mine = np.flatnonzero(design.readings.position == k)
-        balls = where[mine]
-        outlines.append(_outline(balls))
-        layers += _plate(outlines[-1], volume.size)
-        layers.append(Layer("dots", "plate", balls[_some(design.readings.ball[mine])]))
-        middle = balls[np.linalg.norm(balls - balls.mean(axis=0), axis=1).argmin()]
+        if not len(mine):
+            continue
+        read = where[mine]
+        positions.append((name, read))
+        balls.append(Layer("dots", "plate", read[_some(design.readings.ball[mine])]))
+        middle = read[np.linalg.norm(read - read.mean(axis=0), axis=1).argmin()]
         offsets = design.probes.offsets[np.unique(design.readings.probe[mine])]
         styli += [np.stack([middle, middle - offset]) for offset in offsets if offset.any()]
     if styli:
-        layers.append(Layer("lines", "ink fine", np.concatenate(styli), (2,) * len(styli)))
-        layers.append(Layer("dots", "ink", np.stack([stylus[1] for stylus in styli])))
-    layers.append(_names(position_names, outlines))
-    words = f"{len(positions_read)} positions in the volume, which the run sheet lists"
+        balls.append(Layer("lines", "ink fine", np.concatenate(styli), (2,) * len(styli)))
+        balls.append(Layer("dots", "ink", np.stack([stylus[1] for stylus in styli])))
+    words = f"{len(positions)} positions in the volume, which the run sheet lists"
     caption = (
         "Positions in the volume: balls that are read, and from one ball of each position the styli"
         " to the machine's reference point."
     )
-    if not names_fit(position_names):
+    if not names_fit([name for name, _ in positions]):
         caption += " Positions are numbered as in the run sheet."
     if len(design.readings.ball) and max(_counts(design)) > MOST_BALLS:
         caption += " Only some of the balls are drawn."
-    return SpatialPicture(layers, words, caption)
+    return plates_view(volume.lower, volume.upper, positions, words, caption, balls)
 
 
 def plates_view(
-    lower: Array, upper: Array, positions: Sequence[tuple[str, Array]], words: str, caption: str
+    lower: Array,
+    upper: Array,
+    positions: Sequence[tuple[str, Array]],
+    words: str,
+    caption: str,
+    more: Sequence[Layer] = (),
 ) -> SpatialPicture:
     """Return plates in the volume between two corners (d,) by the name of each position and points
-    (k, d) at the edge of its plate.
+    (k, d) at the edge of its plate, and `more` in front of them.
     """
-    outlines = [_outline(points) for _, points in positions]
-    plates = [layer for outline in outlines for layer in _plate(outline, upper - lower)]
-    names = _names([name for name, _ in positions], outlines)
-    return SpatialPicture([*volume_layers(lower, upper), *plates, names], words, caption)
-
-
-def _names(names: Sequence[str], outlines: Sequence[Array]) -> Layer:
-    """The names of positions at their plates, or their numbers if names do not fit."""
-    labels = []
-    for outline in outlines:
-        (_, up), _ = projection(outline.shape[1])
+    layers = volume_layers(lower, upper)
+    (_, up), _ = projection(len(lower))
+    thickness = THICKNESS * float((upper - lower).max())
+    labels, names = [], [name for name, _ in positions]
+    for _, points in positions:
+        outline = _outline(points)
+        if len(outline) > 2:
+            layers.append(Layer("areas", "plate", outline, (len(outline),)))
+        layers.append(_edges(outline, thickness))
         # Plates in a plane do not hide one another's middle.
         centre, top = outline.mean(axis=0), outline[(outline @ up).argmax()]
-        labels.append(centre if len(up) == 2 else top + 0.12 * (top - centre))
-    shown = tuple(names) if names_fit(names) else tuple(str(k + 1) for k in range(len(names)))
-    return Layer("labels", "names", np.array(labels), names=shown)
-
-
-def _plate(outline: Array, size: Array) -> list[Layer]:
-    """The plate of an outline (k, d) in a volume of a `size` (d,)."""
-    areas = [Layer("areas", "plate", outline, (len(outline),))] if len(outline) > 2 else []
-    return [*areas, _edges(outline, THICKNESS * float(size.max()))]
+        labels.append(centre if len(lower) == 2 else top + 0.12 * (top - centre))
+    shown = names if names_fit(names) else [str(k + 1) for k in range(len(names))]
+    layers += [*more, Layer("labels", "names", np.array(labels), names=tuple(shown))]
+    return SpatialPicture(layers, words, caption)
 
 
 def _edges(outline: Array, thickness: float) -> Layer:

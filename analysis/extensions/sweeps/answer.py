@@ -9,7 +9,7 @@ from ballplate.presentation import number, percent
 from ballplate.simulator.computing import comparable
 from ballplate.simulator.design import Flags
 from ballplate.simulator.inputs import listing, number_of
-from ballplate.simulator.machines import Array, Integers
+from ballplate.simulator.machines import Integers
 from ballplate.uncertainty import RECORDED
 from numpy.typing import NDArray
 
@@ -18,7 +18,6 @@ from .cases import SweepCases, column_unit
 # Cases in the table of the best.
 LISTED = 8
 
-OBSERVATIONS = "observations"
 WITHIN = "U6_within_target"
 
 # Quantities to judge cases by: the average of the first that is recorded.
@@ -31,7 +30,7 @@ class SweepAnswer:
     """Sentences, and the rows of the best cases, best first; `case` is the number of the best.
 
     `is_good` unless no case meets an existing target; `outstanding` are rows to show first, each
-    with the reason.
+    with its sentence.
     """
 
     sentences: tuple[str, ...]
@@ -46,78 +45,61 @@ def answer(result: SweepCases) -> SweepAnswer | None:
     column, done = criterion(result), np.flatnonzero(result.done)
     if column is None or not len(done):
         return None
-    value, share = result.figure(column)[done], result.figure(WITHIN)[done]
-    meets, partly = share == 1.0, ~np.isfinite(value)
-    has_target = bool(np.isfinite(share).any())
-    unit, cost = _cost(result, done, meets)
-    if has_target:
-        sentences = _sentences_with_target(result, done, column, share, (unit, cost), value)
-        order = best_first(~meets, cost, value) if meets.any() else best_first(-share, value)
+    value, share, cost = (result.figure(name)[done] for name in (column, WITHIN, "hours"))
+    meets, judged, known = share == 1.0, np.isfinite(share), np.isfinite(value)
+    unit = "laboratory hours"
+    if not np.isfinite(cost[meets]).any():
+        unit, cost = "observations", result.figure("observations")[done]
+    # Cases to find: by a figure, among some.
+    wanted = [(f"smallest average of {quantity(column)}", known, value)]
+    if meets.any():
+        order = best_first(~meets, comparable(cost), value)
+        is_priced = meets & np.isfinite(cost)
+        wanted.append((f"fewest {unit} of the cases that meet the target", is_priced, cost))
+    elif judged.any():
+        order = best_first(-share, value)
+        wanted.append(("nearest to the target", judged, -share))
     else:
-        sentences = _sentences_without_target(result, done, column, value, partly)
-        order = best_first(partly, value)
+        order = best_first(~known, value)
+    reasons: dict[int, str] = {}
+    for words, mask, figure in wanted:
+        alike = mask & (comparable(figure) == comparable(figure)[mask].min(initial=np.inf))
+        rows = done[order[alike[order]]].tolist()
+        if rows:
+            one_of = f", one of {len(rows)}" if rows[1:] else ""
+            before = f"{reasons[rows[0]]}; " if rows[0] in reasons else ""
+            reasons[rows[0]] = f"{before}{words}{one_of}"
+    outstanding = {
+        row: f"{words[0].upper()}{words[1:]}: {described(result, row, column)}."
+        for row, words in reasons.items()
+    }
+    sentences = [*_verdict(result, meets, judged), *outstanding.values()]
+    if not known.any():
+        sentences.append(f"Every case leaves some of {quantity(column)} undetermined.")
+    unpriced = int((meets & ~np.isfinite(cost)).sum())
+    if unpriced:
+        sentences.append(f"Of {_cases(unpriced)} that meet the target, the {unit} are unknown.")
     sentences += [f"Given {text}." for text in _with_cases(result, "given")]
     sentences += _sentences_on_others(result, done)
     best = tuple(done[order[:LISTED]].tolist())
-    found = _outstanding(done, column, value, share, (unit, cost), int(order[0]))
-    case, is_good = int(result.table["cell"][best[0]]), bool(meets.any()) or not has_target
-    return SweepAnswer(tuple(sentences), best, case, is_good, found)
+    case, is_good = int(result.table["cell"][best[0]]), bool(meets.any() or not judged.any())
+    return SweepAnswer(tuple(sentences), best, case, is_good, outstanding)
 
 
-def _outstanding(
-    done: Integers, column: str, value: Array, share: Array, costs: tuple[str, Array], first: int
-) -> dict[int, str]:
-    """Return the rows of the case with the smallest average and of that at the `first` place, with
-    the reasons.
-    """
-    reasons: dict[int, str] = {}
-    (unit, cost), meets, known = costs, share == 1.0, np.isfinite(value)
-    if known.any():
-        least, alike = _first_of_best(value, np.flatnonzero(known))
-        # Of equal cases, the one that heads the list.
-        least = first if (comparable(value) == comparable(value)[least])[first] else least
-        of_known = "" if known.all() else " of the cases that determine it"
-        words = f"smallest average of {quantity(column)}{of_known}{_as_have(alike)}"
-        reasons[int(done[least])] = words
-    words = ""
-    if meets.any() and np.isfinite(cost[first]):
-        words = f"fewest {unit} of the cases that meet the target"
-        words += _as_have(int((cost[meets] == cost[first]).sum()) - 1)
-    elif np.isfinite(share).any() and not meets.any():
-        words = f"nearest to the target{_as_have(int((share == share[first]).sum()) - 1)}"
-    if words:
-        row = int(done[first])
-        reasons[row] = "; ".join(filter(None, [reasons.get(row), words]))
-    return reasons
-
-
-def _cost(result: SweepCases, done: Integers, meets: Flags) -> tuple[str, Array]:
-    """Return what the cases that meet the target are compared by, and its values (m,): hours if
-    known for any of them.
-    """
-    hours = result.figure("hours")[done]
-    if np.isfinite(hours[meets]).any():
-        return "laboratory hours", comparable(hours)
-    return OBSERVATIONS, result.figure(OBSERVATIONS)[done]
-
-
-def _as_have(alike: int) -> str:
-    """Return that further cases are equal to one."""
-    return f", as {_verb(alike, 'have')} {alike} more" if alike else ""
-
-
-def described(result: SweepCases, row: int, column: str) -> str:
-    """Return a case in a line: number, values of the axes, and figures."""
-    value, share = result.figure(column)[row], result.figure(WITHIN)[row]
-    parts = [
-        _with_value(column, value) if np.isfinite(value) else f"{quantity(column)} undetermined"
-    ]
-    if np.isfinite(share):
-        parts.append(f"{percent(float(share))} of the lengths within target")
-    for name in ("positions", "observations", "hours"):
-        if np.isfinite(count := result.figure(name)[row]):
-            parts.append(f"{number(count) if name == 'hours' else int(count)} {name}")
-    return f"case {result.table['cell'][row]}: {'; '.join([result.words(row), *parts])}"
+def _verdict(result: SweepCases, meets: Flags, judged: Flags) -> list[str]:
+    """Return sentences on the numbers of cases that meet the target, which may be an axis."""
+    count, apart = int(judged.sum()), int((~judged).sum())
+    if meets.any():
+        found = int(meets.sum())
+        verdict = f"{found} of {_cases(count)} {_verb(found, 'meet')}"
+    elif count:
+        verdict = f"None of the {count} cases meets" if count > 1 else "The only case does not meet"
+    elif WITHIN.partition("_")[0] in result.definition["record"]:
+        return ["No case has a target uncertainty for its lengths."]
+    else:
+        return ["U6 is not recorded, so that no case is compared with a target uncertainty."]
+    more = f"{_cases(apart)} more {_verb(apart, 'have')} no target to be compared with."
+    return [f"{verdict} the target uncertainty with all lengths.", *[more] * (apart > 0)]
 
 
 def criterion(result: SweepCases) -> str | None:
@@ -146,99 +128,19 @@ def best_first(*keys: NDArray[np.generic]) -> Integers:
     return np.lexsort([comparable(value), *reversed(before)])
 
 
-def _sentences_with_target(
-    result: SweepCases,
-    done: Integers,
-    column: str,
-    share: Array,
-    costs: tuple[str, Array],
-    value: Array,
-) -> list[str]:
-    """Return sentences on cases with a target, which may be an axis of the sweep."""
-    meets, judged = share == 1.0, int(np.isfinite(share).sum())
-    apart = len(done) - judged
-    if meets.any():
-        sentences = [
-            f"{meets.sum()} of {_cases(judged)} {_verb(int(meets.sum()), 'meet')} the target"
-            " uncertainty with all lengths.",
-            _cheapest_sentence(result, done, column, np.flatnonzero(meets), *costs, value),
-        ]
-    else:
-        best = best_first(-share, value)[0]
-        alike = int((share == share[best]).sum()) - 1
-        tied = f"; {_cases(alike)} more {_verb(alike, 'have')} as many" if alike else ""
-        subject = "The only case does not meet" if judged == 1 else f"None of the {judged}"
-        subject += "" if judged == 1 else " cases meets"
-        sentences = [
-            f"{subject} the target uncertainty with all lengths. The"
-            f" nearest is {result.words(done[best])}, with {percent(float(share[best]))} of"
-            f" the lengths{tied}."
-        ]
-    if apart:
-        sentences.append(
-            f"{_cases(apart)} more {_verb(apart, 'have')} no target to be compared with."
-        )
-    return sentences
-
-
-def _cheapest_sentence(
-    result: SweepCases,
-    done: Integers,
-    column: str,
-    candidates: Integers,
-    unit: str,
-    cost: Array,
-    value: Array,
-) -> str:
-    """Return a sentence on the case with the least cost in a unit and, among those, the smallest
-    average.
-    """
-    counted = candidates[np.isfinite(cost[candidates])]
-    if not len(counted):
-        return f"Their numbers of {unit} are not recorded."
-    least = cost[counted].min()
-    fewest = counted[cost[counted] == least]
-    best, same = _first_of_best(value, fewest)
-    name, amount = (
-        result.words(done[best]),
-        number(least) if unit != OBSERVATIONS else f"{least:.0f}",
-    )
-    unknown = len(candidates) - len(counted)
-    more = f" Those of {_cases(unknown)} more that {_verb(unknown, 'meet')} it are unknown."
-    more = more if unknown else ""
-    if len(fewest) == 1:
-        return f"The one with the fewest {unit} is {name}: {amount} {unit}.{more}"
-    return (
-        f"The fewest {unit} are {amount}, in {len(fewest)} of these cases."
-        f" Among these, {name} has the smallest average of {_with_value(column, value[best])}"
-        f"{_as_have(same)}.{more}"
-    )
-
-
-def _sentences_without_target(
-    result: SweepCases, done: Integers, column: str, value: Array, partly: Flags
-) -> list[str]:
-    """Return sentences on cases without a target."""
-    if WITHIN.partition("_")[0] in result.definition["record"]:
-        sentence = "No case has a target uncertainty for its lengths."
-    else:
-        sentence = "U6 is not recorded, so that no case is compared with a target uncertainty."
-    if partly.all():
-        return [sentence, f"Every case leaves some of {quantity(column)} undetermined."]
-    best, alike = _first_of_best(value, np.flatnonzero(~partly))
-    tied = f"; {_cases(alike)} more {_verb(alike, 'have')} the same" if alike else ""
-    return [
-        sentence,
-        f"The smallest average of {_with_value(column, value[best])}, is that of"
-        f" {result.words(done[best])}{tied}.",
+def described(result: SweepCases, row: int, column: str) -> str:
+    """Return a case in a line: number, values of the axes, and figures."""
+    value, share = result.figure(column)[row], result.figure(WITHIN)[row]
+    average = f"{number(1e6 * value, 3)} {column_unit(column.partition('_average_')[2])}"
+    parts = [
+        f"case {result.table['cell'][row]}: {result.words(row)}",
+        f"{quantity(column)} average {average if np.isfinite(value) else 'undetermined'}",
+        f"{percent(float(share))} of the lengths within target" if np.isfinite(share) else "",
     ]
-
-
-def _first_of_best(value: Array, places: Integers) -> tuple[int, int]:
-    """Return the first of `places` with the smallest value, and the number of further ones."""
-    values = comparable(value[places])
-    best = best_first(values)[0]
-    return int(places[best]), int((values == values[best]).sum()) - 1
+    for name in ("positions", "observations", "hours"):
+        count = result.figure(name)[row]
+        parts.append(f"{round(count, 2):.10g} {name}" if np.isfinite(count) else "")
+    return "; ".join(filter(None, parts))
 
 
 def _sentences_on_others(result: SweepCases, done: Integers) -> list[str]:
@@ -283,10 +185,3 @@ def _verb(count: int, verb: str) -> str:
     ('has', 'have', 'meets')
     """
     return verb if count != 1 else "has" if verb == "have" else f"{verb}s"
-
-
-def _with_value(column: str, value: float) -> str:
-    """Return a quantity with its average."""
-    return (
-        f"{quantity(column)}, {number(1e6 * value, 3)} {column_unit(column.split('_average_')[1])}"
-    )

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import PurePosixPath
 
-import numpy as np
 from ballplate.extensions.pages.interface import (
     Html,
     Page,
@@ -18,17 +17,32 @@ from ballplate.extensions.pages.interface import (
     table,
     written,
 )
-from ballplate.presentation import number, percent, table_rows
-from ballplate.simulator.machines import Array
+from ballplate.presentation import number, table_rows
 
-from .answer import WITHIN, SweepAnswer, answer, criterion, described
+from .answer import SweepAnswer, answer, criterion, described
 from .cases import IN_TEXT, MOST_ROWS, SHOWN, SweepCases, columns_of
-from .curves import curves, frontier_chart
+from .curves import charts, curves, least_for_hours
 from .design_drawings import drawings, drawn
-from .effects import effects, frontier, known_hours
+from .effects import effects
 
 # Values of an axis in the list of facts.
 LISTED = 12
+
+CAPTIONS = {
+    "best": "The best cases",
+    "frontier": "Cases of which no other has less uncertainty in as few hours",
+    "cases": "Cases by number",
+}
+EFFECTS = "Largest average over smallest along each axis, for each combination of the others"
+HEADS = (
+    "axis",
+    "median",
+    "least",
+    "most",
+    "smallest at, in combinations",
+    "combinations with two or more values",
+    "with all values",
+)
 
 # Temporary sweep file of the studio.
 MADE_IN_STUDIO = ".ballplate-sweep.yaml"
@@ -38,141 +52,91 @@ FOOT = "Standard uncertainties throughout; ballplate sweep --export has all figu
 
 def sweep_page(result: SweepCases) -> str:
     """Return the page of a sweep."""
-    found, judged, hours = answer(result), criterion(result), known_hours(result)
-    value = result.figure(judged or "")
-    best = [] if hours is None else frontier(hours, value).tolist()
-    first = [] if found is None else [*found.outstanding, *found.best]
-    order = dict.fromkeys([*first, *best, *range(len(result.table))])
-    rows = sorted(list(order)[:MOST_ROWS])
+    found, judged = answer(result), criterion(result)
+    value, best = result.figure(judged or ""), least_for_hours(result, judged)
+    first = [] if found is None else [*found.outstanding, *found.best, *best]
+    rows = sorted(list(dict.fromkeys([*first, *range(len(result.table))]))[:MOST_ROWS])
     designs = drawings(result, rows)
-    drawn_rows = {row for group in designs.values() for row in group}
+    targets = {row: _id(result, row) for group in designs.values() for row in group}
+
+    def listed(name: str, rows: Sequence[int], shown: Collection[str] = IN_TEXT) -> Html:
+        return _table(name, result, rows, shown, targets)
+
     left_out = len(result.table) - len(rows)
     more = note(f"Cases not shown here: {left_out}.") if left_out else ""
-    cases = joined([_table("cases", "", result, rows, SHOWN, drawn_rows), more])
-    listed = element("ul", *(element("li", text) for text in result.shortcomings))
-    answered = axes = costs = Html()
+    notes = element("ul", *(element("li", text) for text in result.shortcomings))
+    body = dict.fromkeys(("answer", "frontier", "axes", "cases", "designs"), Html())
+    if rows:
+        body["cases"] = joined([listed("cases", rows, SHOWN), more])
     if found is not None and judged is not None:
-        answered = _answer(result, found, judged)
-        targets = {row: f"case-{result.table['cell'][row]}" for row in rows}
-        charts = curves(result, judged, targets)
-        axes = joined([_effects(result, value), element("div", *charts, class_="charts")])
-        if hours is not None and best:
-            chart = frontier_chart(result, judged, hours, best, targets)
-            caption = "Cases that no other beats in both"
-            shown = _table(
-                "frontier", caption, result, [row for row in best if row in targets], IN_TEXT
-            )
-            costs = joined([element("div", chart, class_="charts"), shown])
+        verdict, *further = found.sentences
+        kind = "verdict" if found.is_good else "verdict bad"
+        others = (sentence(each) for each in further if each not in found.outstanding.values())
+        pictures = (_outstanding(result, row, found) for row in found.outstanding)
+        shown = element("div", *pictures, class_="picked"), *others, listed("best", found.best)
+        costs = note("Observations are readings and certified values.")
+        body["answer"] = joined([element("p", verdict, class_=kind), *shown, costs])
+        figures = curves(charts(result, judged, best, targets))
+        if best:
+            body["frontier"] = joined([figures.pop(0), listed("frontier", best)])
+        texts = effects(result, value)
+        body["axes"] = joined([table("effects", EFFECTS, HEADS, texts, (0, 4)), *figures])
+        body["designs"] = joined(_designs(result, designs, judged))
     sections = [
-        PageSection("answer", "Answer", answered),
-        PageSection("costs", "Uncertainty against hours", costs),
-        PageSection("axes", "Effect of each axis", axes),
-        PageSection("cases", "Cases", cases if rows else Html()),
-        PageSection("designs", "Designs", _designs(result, designs, judged or "")),
-        PageSection("notes", "Failures and notes", listed if result.shortcomings else Html()),
+        PageSection("answer", "Answer", body["answer"]),
+        PageSection("frontier", "Uncertainty against hours", body["frontier"]),
+        PageSection("axes", "Effect of each axis", body["axes"]),
+        PageSection(
+            "cases", "Cases", joined([listed("cases", rows, SHOWN), more]) if rows else Html()
+        ),
+        PageSection("designs", "Designs", body["designs"]),
+        PageSection("notes", "Failures and notes", notes if result.shortcomings else Html()),
         PageSection("swept", "What was swept", facts_list(_facts(result))),
     ]
     return written(Page(result.title, sentence(f"{result.headline()}."), sections, FOOT))
 
 
-def _answer(result: SweepCases, found: SweepAnswer, column: str) -> Html:
-    first, *further = found.sentences
-    verdict = element("p", first, class_="verdict" if found.is_good else "verdict bad")
-    shown = (
-        _outstanding(result, row, reason, found.case) for row, reason in found.outstanding.items()
-    )
-    best = _table("best", "The best cases", result, found.best, IN_TEXT)
-    is_timed = np.isfinite(result.figure("hours")).any()
-    others = "hours include set-ups and changes" if is_timed else "other costs are not included"
-    costs = note(f"Observations are readings and certified values; {others}.")
-    pictures = element("div", *shown, class_="picked")
-    return joined([verdict, *map(sentence, further), pictures, best, costs])
+def _id(result: SweepCases, row: int) -> str:
+    return f"case-{result.table['cell'][row]}"
 
 
-def _outstanding(result: SweepCases, row: int, reason: str, assessed: int) -> Html:
-    """Return a case with its figures, what they take for granted, and its design."""
-    number_of_case = result.table["cell"][row]
-    heads, (texts,) = _cells(result, [row], IN_TEXT)
-    facts = [(head, text) for head, text in zip(heads, texts, strict=True) if text]
-    share = result.figure(WITHIN)[row]
-    met = "met with all lengths" if share == 1.0 else f"met with {percent(float(share))} of lengths"
-    facts += [("target", met)] if np.isfinite(share) else []
-    if "assess" not in result.table["given"][row] and (
-        number_of_case != assessed or result.summary.left
-    ):
-        facts.append(("assumptions", "not assessed for this case"))
-    pictures = (
-        drawn(text, sentence("Positions in the volume")) for text in drawings(result, [row])
-    )
-    head = element("h3", f"Case {number_of_case}: {reason}")
-    return element("div", head, *pictures, facts_list(facts))
+def _outstanding(result: SweepCases, row: int, found: SweepAnswer) -> Html:
+    """Return a case with what its figures take for granted, and its design."""
+    given = result.table["given"][row]
+    notes = [note(f"Given {given}.")] if given else []
+    is_assessed = row == found.best[0] and not result.summary.left
+    if not is_assessed and "assess" not in given:
+        notes.append(note("The assumptions of this case are not assessed."))
+    pictures = map(drawn, drawings(result, [row]))
+    return element("div", sentence(found.outstanding[row]), *notes, *pictures)
 
 
-def _effects(result: SweepCases, value: Array) -> Html:
-    """Return the table of the axes' effects."""
-    rows = []
-    for axis in effects(result, value):
-        compared = len(axis.ratios)
-        ratios = (np.median(axis.ratios), axis.ratios.min(), axis.ratios.max()) if compared else ()
-        best = f"{' or '.join(axis.best)}, in {axis.wins} of {compared}" if compared else "-"
-        texts = [f"{ratio:.2f}" if np.isfinite(ratio) else "-" for ratio in ratios] or ["-"] * 3
-        counts = f"{compared} of {axis.combinations}", str(axis.complete)
-        rows.append([axis.name, str(axis.values), *texts, best, *counts])
-    heads = ["axis", "values", "largest / smallest, median", "least", "most"]
-    heads += ["best value, in combinations", "combinations compared", "of these, with all values"]
-    words = note(
-        "The largest average along the axis over the smallest, for each combination of the other"
-        " axes with two or more cases that determine it. Dots of the charts lead to the case's"
-        " design."
-    )
-    return joined([table("effects", "", heads, rows, (0, 5)), words]) if rows else Html()
-
-
-def _designs(result: SweepCases, designs: dict[str, list[int]], column: str) -> Html:
-    """Return drawings of cases, each once for all cases with the same positions."""
-    parts = []
+def _designs(result: SweepCases, designs: dict[str, list[int]], column: str) -> Iterator[Html]:
+    """Return drawings, each once with all its cases."""
     for text, rows in designs.items():
-        cases = [
-            element("p", described(result, row, column), id=f"case-{result.table['cell'][row]}")
-            for row in rows
-        ]
-        parts.append(drawn(text, *cases))
-    return element("div", *parts, class_="designs") if parts else Html()
+        cases = (element("p", described(result, row, column), id=_id(result, row)) for row in rows)
+        yield element("div", drawn(text, *cases), class_="design")
 
 
 def _table(
     name: str,
-    caption: str,
     result: SweepCases,
     rows: Sequence[int],
-    shown: Collection[str] = SHOWN,
-    drawn_rows: Collection[int] | None = None,
+    shown: Collection[str],
+    targets: Mapping[int, str],
 ) -> Html:
-    """Return a table of cases that leads to what is drawn, and to the table of all cases."""
-    heads, texts = _cells(result, rows, shown)
-    for row, cells in zip(rows, texts, strict=True):
-        case = str(result.table["cell"][row])
-        is_here = drawn_rows is not None and row not in drawn_rows
-        where = {"id": f"case-{case}"} if is_here else {"href": f"#case-{case}"}
-        cells.insert(0, element("span" if is_here else "a", case, **where))
-    words = [
-        k + 1
-        for k, (_, values) in enumerate(columns_of(result, rows, shown))
-        if isinstance(values[0], str)
-    ]
-    return table(name, caption, ["case", *heads], texts, words, is_long=len(texts) > LISTED)
-
-
-def _cells(
-    result: SweepCases, rows: Sequence[int], shown: Collection[str]
-) -> tuple[list[str], list[list[str]]]:
-    """Return headings and texts of the cells of some rows."""
+    """Return a table of cases that leads to their designs."""
     columns = columns_of(result, rows, shown)
     texts = [
         ["" if v is None else number(v) if isinstance(v, float) else str(v) for v in row.values()]
         for row in table_rows(columns, in_units=True)
     ]
-    return [heading for heading, _ in columns], texts
+    for row, cells in zip(rows, texts, strict=True):
+        case = str(result.table["cell"][row])
+        cells.insert(0, element("a", case, href=f"#{targets[row]}") if row in targets else case)
+    words = [k + 1 for k, (_, values) in enumerate(columns) if isinstance(values[0], str)]
+    heads = ["case", *(heading for heading, _ in columns)]
+    return table(name, CAPTIONS[name], heads, texts, words, is_long=len(texts) > LISTED)
 
 
 def _source(path: str) -> tuple[str, str]:
