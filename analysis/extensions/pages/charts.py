@@ -74,13 +74,9 @@ class _Scale:
     height: float
     width: float
 
-    @property
-    def right(self) -> float:
-        return self.width - RIGHT
-
     def x(self, values: Array) -> Array:
         low, high = self.across
-        return np.asarray(LEFT + (values - low) / (high - low) * (self.right - LEFT))
+        return np.asarray(LEFT + (values - low) / (high - low) * (self.width - LEFT - RIGHT))
 
     def y(self, values: Array) -> Array:
         low, high = self.up
@@ -99,10 +95,9 @@ def _limits(chart: Chart) -> tuple[tuple[float, float], tuple[float, float]]:
     vertical = (0.0 if chart.from_zero and low >= 0.0 else low - room, ends[1] + room)
     low, high = _ends(across)
     if chart.places:
-        where = np.sort([x for x, _ in chart.places])
-        half = 0.5 * float(np.diff(where).min(initial=np.inf))
-        half = half if math.isfinite(half) else 0.5
-        return (float(where[0]) - half, float(where[-1]) + half), vertical
+        where = sorted(x for x, _ in chart.places)
+        half = 0.5 * min(np.diff(where), default=1.0)
+        return (where[0] - half, where[-1] + half), vertical
     return (low, high if high > low else low + 1.0), vertical
 
 
@@ -130,7 +125,7 @@ def _grid(chart: Chart, scale: _Scale) -> list[Html]:
         ticks(*scale.up), scale.y(np.array(ticks(*scale.up))).tolist(), strict=True
     ):
         kind = "zero" if value == 0.0 and scale.up[0] < 0.0 else "grid"
-        lines.append(_path(f"M{LEFT:g} {y:.1f}H{scale.right:g}", kind))
+        lines.append(_path(f"M{LEFT:g} {y:.1f}H{scale.width - RIGHT:g}", kind))
         texts.append(_text(LEFT - 5, y + 3.5, f"{value:g}", "end"))
     if chart.places:
         for x, name in _shown_places(chart, scale):
@@ -140,7 +135,7 @@ def _grid(chart: Chart, scale: _Scale) -> list[Html]:
         for value, x in zip(values, scale.x(np.array(values)).tolist(), strict=True):
             lines.append(_path(f"M{x:.1f} {ABOVE:g}V{bottom:g}", "grid"))
             texts.append(_text(x, bottom + 13, f"{value:g}", "middle"))
-    texts.append(_text((LEFT + scale.right) / 2, bottom + 28, chart.across, "middle"))
+    texts.append(_text((LEFT + scale.width - RIGHT) / 2, bottom + 28, chart.across, "middle"))
     middle = ABOVE + (bottom - ABOVE) / 2
     turned = f"rotate(-90 11 {middle:g})"
     texts.append(element("text", chart.up, x=11, y=middle, text_anchor="middle", transform=turned))
@@ -150,7 +145,7 @@ def _grid(chart: Chart, scale: _Scale) -> list[Html]:
 def _shown_places(chart: Chart, scale: _Scale) -> list[tuple[float, str]]:
     """Return names along the axis if they fit, otherwise some of their numbers."""
     where = scale.x(np.array([x for x, _ in chart.places])).tolist()
-    room = (scale.right - LEFT) / max(len(where), 1)
+    room = (scale.width - LEFT - RIGHT) / max(len(where), 1)
     longest = max(len(name) for _, name in chart.places)
     if 5.6 * min(longest, LETTERS) < room:
         most = max(LETTERS, int(room / 5.6))
@@ -188,8 +183,9 @@ def _trace(trace: Trace, scale: _Scale) -> Html:
 
 def _noted(x: float, y: float, style: str, words: str, target: str) -> Html:
     """A dot with its text. Tables have the links for those who use no pointer."""
-    parts = element("title", words), _path(f"M{x:g} {y:g}h0", f"dots noted {style}")
-    return element("a", *parts, href=f"#{target}", tabindex=-1) if target else element("g", *parts)
+    dot = _path(f"M{x:g} {y:g}h0", f"dots noted {style}")
+    href = f"#{target}" if target else None
+    return element("a", element("title", words), dot, href=href, tabindex=-1)
 
 
 def _runs(is_finite: np.ndarray) -> list[list[int]]:

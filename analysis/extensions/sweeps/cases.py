@@ -35,10 +35,6 @@ SHOWN = {
     "spread_ratio": "spread / U",
     "coverage_sigma_given": "covered, %",
 }
-# Counts, and what a case costs, with headings.
-WHOLE_NUMBERS = ("positions", "readings", "observations", "rank deficiency")
-COUNTS = {name.replace(" ", "_"): name for name in WHOLE_NUMBERS}
-COUNTS |= {"hours": "hours", "bound_m": "bound, µm"}
 IN_TEXT = ("average", "within_target")
 FIGURE = re.compile(rf"(.+?)_({'|'.join(SHOWN)})(?:_(m|rad|m_or_rad|ratio))?")
 # Quantities, without their parts.
@@ -127,12 +123,13 @@ def columns_of(
     ]
     if not result.done.all():
         columns.append(("status", table["status"].tolist()))
-    for name, heading in COUNTS.items():
-        found = result.figure(name)
-        if (found > 0).any():
-            form = int if heading in WHOLE_NUMBERS else float
-            values = [None if math.isnan(v) else form(v) for v in found[table.index].tolist()]
-            columns.append((heading, values))
+    for name in ("positions", "readings", "observations", "rank_deficiency"):
+        if (result.figure(name) > 0).any():
+            values = [None if math.isnan(v) else int(v) for v in result.figure(name)[table.index]]
+            columns.append((name.replace("_", " "), values))
+    for heading, name in (("hours", "hours"), ("bound, µm", "bound_m")):
+        if (result.figure(name) > 0.0).any():
+            columns.append((heading, result.figure(name)[table.index].tolist()))
     for name in table.columns:
         match = FIGURE.fullmatch(name)
         if match is None or match[2] not in shown or match[1].removesuffix("_more") not in WHOLE:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from ballplate.presentation import number
 from ballplate.simulator.computing import comparable
-from ballplate.simulator.machines import Array, Integers
+from ballplate.simulator.machines import Array
 
 from .cases import SweepCases
 
@@ -44,16 +44,15 @@ def averages_along(result: SweepCases, value: Array, k: int) -> Array:
     return averages
 
 
-def frontier(cost: Array, value: Array) -> Integers:
-    """Return the places, by cost, of which no other has less of one without more of the other,
-    except by rounding; NaN is left out.
-
-    >>> frontier(np.array([2.0, 1.0, 1.0, 3.0]), np.array([1.0, 5.0, 6.0, 1.0])).tolist()
-    [1, 0]
+def frontier(result: SweepCases, value: Array) -> list[int]:
+    """Return the rows of which no other has a smaller `value` (rows,) in as few hours, or fewer
+    hours at most as large a value, except by rounding, by hours; none unless hours differ.
     """
-    known = np.flatnonzero(np.isfinite(cost + value))
-    cost, value = comparable(cost[known]), comparable(value[known])
-    order = np.lexsort([value, cost])
-    least = np.minimum.accumulate(value[order])
-    since = np.maximum.accumulate(np.where(np.diff(least, prepend=np.inf) < 0.0, cost[order], -1.0))
-    return known[order[(value[order] == least) & (cost[order] == since)]]
+    hours, value = comparable(result.figure("hours")), comparable(value)
+    known = np.flatnonzero(np.isfinite(hours + value))
+    found: list[int] = []
+    for row in known[np.lexsort([value[known], hours[known]])].tolist():
+        last = found[-1] if found else row
+        if value[row] < value[last] or (value[row], hours[row]) == (value[last], hours[last]):
+            found.append(row)
+    return found if np.unique(hours[known]).size > 1 else []

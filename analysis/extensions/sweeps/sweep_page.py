@@ -21,9 +21,9 @@ from ballplate.presentation import number, table_rows
 
 from .answer import SweepAnswer, answer, criterion, described
 from .cases import IN_TEXT, MOST_ROWS, SHOWN, SweepCases, columns_of
-from .curves import charts, curves, least_for_hours
+from .curves import charts, curves
 from .design_drawings import drawings, drawn
-from .effects import effects
+from .effects import effects, frontier
 
 # Values of an axis in the list of facts.
 LISTED = 12
@@ -53,7 +53,8 @@ FOOT = "Standard uncertainties throughout; ballplate sweep --export has all figu
 def sweep_page(result: SweepCases) -> str:
     """Return the page of a sweep."""
     found, judged = answer(result), criterion(result)
-    value, best = result.figure(judged or ""), least_for_hours(result, judged)
+    value = result.figure(judged or "")
+    best = frontier(result, value)[:MOST_ROWS]
     first = [] if found is None else [*found.outstanding, *found.best, *best]
     rows = sorted(list(dict.fromkeys([*first, *range(len(result.table))]))[:MOST_ROWS])
     designs = drawings(result, rows)
