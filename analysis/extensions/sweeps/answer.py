@@ -51,27 +51,24 @@ def answer(result: SweepCases) -> SweepAnswer | None:
     if not np.isfinite(cost[meets]).any():
         unit, cost = "observations", result.figure("observations")[done]
     # Cases to find: by a figure, among some.
-    wanted = [(f"smallest average of {quantity(column)}", known, value)]
+    wanted = [(f"Smallest average of {quantity(column)}", known, value)]
     if meets.any():
         order = best_first(~meets, comparable(cost), value)
         is_priced = meets & np.isfinite(cost)
-        wanted.append((f"fewest {unit} of the cases that meet the target", is_priced, cost))
+        wanted.append((f"Fewest {unit} of the cases that meet the target", is_priced, cost))
     elif judged.any():
         order = best_first(-share, value)
-        wanted.append(("nearest to the target", judged, -share))
+        wanted.append(("Nearest to the target", judged, -share))
     else:
         order = best_first(~known, value)
     reasons: dict[int, str] = {}
     for words, mask, figure in wanted:
         alike = mask & (comparable(figure) == comparable(figure)[mask].min(initial=np.inf))
-        rows = done[order[alike[order]]].tolist()
-        if rows:
-            one_of = f", one of {len(rows)}" if rows[1:] else ""
-            before = f"{reasons[rows[0]]}; " if rows[0] in reasons else ""
-            reasons[rows[0]] = f"{before}{words}{one_of}"
+        if rows := done[order[alike[order]]].tolist():
+            one_of = f" (one of {len(rows)})" if rows[1:] else ""
+            reasons[rows[0]] = f"{reasons.get(rows[0], '')}{words}{one_of}: "
     outstanding = {
-        row: f"{words[0].upper()}{words[1:]}: {described(result, row, column)}."
-        for row, words in reasons.items()
+        row: f"{words}{described(result, row, column)}." for row, words in reasons.items()
     }
     sentences = [*_verdict(result, meets, judged), *outstanding.values()]
     if not known.any():

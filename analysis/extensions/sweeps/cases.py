@@ -96,11 +96,10 @@ class SweepCases:
             return np.full(len(self.table), math.nan)
         return np.asarray(self.table[name], float)
 
-    def words(self, row: int, axes: Iterable[int] | None = None) -> str:
-        """Return the axes, or some of them, with their values in a row."""
-        chosen = self.chosen[row].tolist()
-        shown = range(len(self.axes)) if axes is None else axes
-        return ", ".join(f"{self.axes[k].name} {self.axes[k].labels[chosen[k]]}" for k in shown)
+    def words(self, row: int) -> str:
+        """Return the axes with their values in a row."""
+        places = zip(self.axes, self.chosen[row].tolist(), strict=True)
+        return ", ".join(f"{axis.name} {axis.labels[k]}" for axis, k in places)
 
     def headline(self) -> str:
         """Numbers of cases."""
@@ -170,8 +169,9 @@ def _axis(stored: dict[str, Any]) -> ShownAxis:
     unit = "" if stored["unit"] == "1" else stored["unit"]
     # The unit as written, if common to all values; otherwise metres or radians.
     matches = [QUANTITY.fullmatch(label.strip()) for label in labels]
-    units = {(match[2] or "").strip() for match in matches if match is not None}
-    if len(units) == 1 and all(matches):
-        numbers = tuple(float(exact_number(match[1])) for match in matches if match is not None)
+    parts = [(match[1], (match[2] or "").strip()) for match in matches if match is not None]
+    units = {each for _, each in parts}
+    if len(units) == 1 and len(parts) == len(labels):
+        numbers = tuple(float(exact_number(number)) for number, _ in parts)
         return ShownAxis(name, labels, numbers, units.pop() or unit)
     return ShownAxis(name, labels, tuple(map(float, stored["values"])), unit)

@@ -14,12 +14,10 @@ from .cases import SweepCases
 
 def drawings(result: SweepCases, rows: Iterable[int]) -> dict[str, list[int]]:
     """Return the drawings of the rows that have one, each with its rows."""
-    found: dict[str, list[int]] = {}
-    for row in rows if "drawing" in result.table else ():
-        text = result.table["drawing"][row]
-        if isinstance(text, str) and text:
-            found.setdefault(text, []).append(row)
-    return found
+    if "drawing" not in result.table:
+        return {}
+    texts = result.table["drawing"].fillna("").iloc[list(rows)]
+    return {text: list(of.index) for text, of in texts.groupby(texts, sort=False) if text}
 
 
 def drawn(text: str, *captions: Html) -> Html:

@@ -45,14 +45,13 @@ def averages_along(result: SweepCases, value: Array, k: int) -> Array:
 
 
 def frontier(result: SweepCases, value: Array) -> list[int]:
-    """Return the rows of which no other has a smaller `value` (rows,) in as few hours, or fewer
-    hours at most as large a value, except by rounding, by hours; none unless hours differ.
+    """Return the rows with a smaller `value` (rows,), except by rounding, than all with fewer or as
+    many hours, by hours; none unless hours differ.
     """
     hours, value = comparable(result.figure("hours")), comparable(value)
     known = np.flatnonzero(np.isfinite(hours + value))
     found: list[int] = []
     for row in known[np.lexsort([value[known], hours[known]])].tolist():
-        last = found[-1] if found else row
-        if value[row] < value[last] or (value[row], hours[row]) == (value[last], hours[last]):
+        if not found or value[row] < value[found[-1]]:
             found.append(row)
     return found if np.unique(hours[known]).size > 1 else []

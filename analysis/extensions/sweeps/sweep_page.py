@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from functools import partial
 from pathlib import PurePosixPath
 
 from ballplate.extensions.pages.interface import (
@@ -33,6 +34,7 @@ CAPTIONS = {
     "frontier": "Cases of which no other has less uncertainty in as few hours",
     "cases": "Cases by number",
 }
+COSTS = note("Observations are readings and certified values.")
 EFFECTS = "Largest average over smallest along each axis, for each combination of the others"
 HEADS = (
     "axis",
@@ -60,37 +62,32 @@ def sweep_page(result: SweepCases) -> str:
     designs = drawings(result, rows)
     targets = {row: _id(result, row) for group in designs.values() for row in group}
 
-    def listed(name: str, rows: Sequence[int], shown: Collection[str] = IN_TEXT) -> Html:
-        return _table(name, result, rows, shown, targets)
-
+    listed = partial(_table, result, targets)
     left_out = len(result.table) - len(rows)
     more = note(f"Cases not shown here: {left_out}.") if left_out else ""
     notes = element("ul", *(element("li", text) for text in result.shortcomings))
-    body = dict.fromkeys(("answer", "frontier", "axes", "cases", "designs"), Html())
-    if rows:
-        body["cases"] = joined([listed("cases", rows, SHOWN), more])
+    sections, drawings_of_all = [], Html()
     if found is not None and judged is not None:
         verdict, *further = found.sentences
         kind = "verdict" if found.is_good else "verdict bad"
         others = (sentence(each) for each in further if each not in found.outstanding.values())
         pictures = (_outstanding(result, row, found) for row in found.outstanding)
         shown = element("div", *pictures, class_="picked"), *others, listed("best", found.best)
-        costs = note("Observations are readings and certified values.")
-        body["answer"] = joined([element("p", verdict, class_=kind), *shown, costs])
+        answered = joined([element("p", verdict, class_=kind), *shown, COSTS])
         figures = curves(charts(result, judged, best, targets))
-        if best:
-            body["frontier"] = joined([figures.pop(0), listed("frontier", best)])
-        texts = effects(result, value)
-        body["axes"] = joined([table("effects", EFFECTS, HEADS, texts, (0, 4)), *figures])
-        body["designs"] = joined(_designs(result, designs, judged))
-    sections = [
-        PageSection("answer", "Answer", body["answer"]),
-        PageSection("frontier", "Uncertainty against hours", body["frontier"]),
-        PageSection("axes", "Effect of each axis", body["axes"]),
-        PageSection(
-            "cases", "Cases", joined([listed("cases", rows, SHOWN), more]) if rows else Html()
-        ),
-        PageSection("designs", "Designs", body["designs"]),
+        costs = [figures.pop(0), listed("frontier", best)] if best else []
+        axes = [table("effects", EFFECTS, HEADS, effects(result, value), (0, 4)), *figures]
+        drawings_of_all = joined(_designs(result, designs, judged))
+        sections = [
+            PageSection("answer", "Answer", answered),
+            PageSection("frontier", "Uncertainty against hours", joined(costs)),
+            PageSection("axes", "Effect of each axis", joined(axes if figures else [])),
+        ]
+    if rows:
+        cases = joined([listed("cases", rows, SHOWN), more])
+        sections.append(PageSection("cases", "Cases", cases))
+    sections += [
+        PageSection("designs", "Designs", drawings_of_all),
         PageSection("notes", "Failures and notes", notes if result.shortcomings else Html()),
         PageSection("swept", "What was swept", facts_list(_facts(result))),
     ]
@@ -105,8 +102,7 @@ def _outstanding(result: SweepCases, row: int, found: SweepAnswer) -> Html:
     """Return a case with what its figures take for granted, and its design."""
     given = result.table["given"][row]
     notes = [note(f"Given {given}.")] if given else []
-    is_assessed = row == found.best[0] and not result.summary.left
-    if not is_assessed and "assess" not in given:
+    if (row != found.best[0] or result.summary.left) and "assess" not in given:
         notes.append(note("The assumptions of this case are not assessed."))
     pictures = map(drawn, drawings(result, [row]))
     return element("div", sentence(found.outstanding[row]), *notes, *pictures)
@@ -120,11 +116,11 @@ def _designs(result: SweepCases, designs: dict[str, list[int]], column: str) -> 
 
 
 def _table(
-    name: str,
     result: SweepCases,
-    rows: Sequence[int],
-    shown: Collection[str],
     targets: Mapping[int, str],
+    name: str,
+    rows: Sequence[int],
+    shown: Collection[str] = IN_TEXT,
 ) -> Html:
     """Return a table of cases that leads to their designs."""
     columns = columns_of(result, rows, shown)
