@@ -10,7 +10,7 @@ from ballplate.simulator.computing import Report, unreported
 from ballplate.simulator.experiment import Experiment
 from ballplate.simulator.inputs import ensure_path, ensure_report
 
-from .charts import Chart, Trace, chart_svg, figure, figures, legend
+from .charts import Chart, Trace, chart_svg, figure, legend
 from .design_views import plates_view
 from .document import Page, PageSection, facts_list, written
 from .elements import Html, element, folded, joined, note, sentence, table
@@ -30,7 +30,6 @@ __all__ = [
     "element",
     "facts_list",
     "figure",
-    "figures",
     "folded",
     "joined",
     "legend",

@@ -54,8 +54,8 @@ def answer(result: SweepCases) -> SweepAnswer | None:
     wanted = [(f"Smallest average of {quantity(column)}", known, value)]
     if meets.any():
         order = best_first(~meets, comparable(cost), value)
-        is_priced = meets & np.isfinite(cost)
-        wanted.append((f"Fewest {unit} of the cases that meet the target", is_priced, cost))
+        words = f"Fewest {unit}, where known, of the cases that meet the target"
+        wanted.append((words, meets & np.isfinite(cost), cost))
     elif judged.any():
         order = best_first(-share, value)
         wanted.append(("Nearest to the target", judged, -share))
@@ -73,9 +73,6 @@ def answer(result: SweepCases) -> SweepAnswer | None:
     sentences = [*_verdict(result, meets, judged), *outstanding.values()]
     if not known.any():
         sentences.append(f"Every case leaves some of {quantity(column)} undetermined.")
-    unpriced = int((meets & ~np.isfinite(cost)).sum())
-    if unpriced:
-        sentences.append(f"Of {_cases(unpriced)} that meet the target, the {unit} are unknown.")
     sentences += [f"Given {text}." for text in _with_cases(result, "given")]
     sentences += _sentences_on_others(result, done)
     best = tuple(done[order[:LISTED]].tolist())
@@ -132,12 +129,12 @@ def described(result: SweepCases, row: int, column: str) -> str:
     parts = [
         f"case {result.table['cell'][row]}: {result.words(row)}",
         f"{quantity(column)} average {average if np.isfinite(value) else 'undetermined'}",
-        f"{percent(float(share))} of the lengths within target" if np.isfinite(share) else "",
     ]
-    for name in ("positions", "observations", "hours"):
-        count = result.figure(name)[row]
-        parts.append(f"{round(count, 2):.10g} {name}" if np.isfinite(count) else "")
-    return "; ".join(filter(None, parts))
+    if np.isfinite(share):
+        parts.append(f"{percent(float(share))} of the lengths within target")
+    counts = [(name, result.figure(name)[row]) for name in ("positions", "observations", "hours")]
+    parts += [f"{round(n, 2):.10g} {name}" for name, n in counts if np.isfinite(n)]
+    return "; ".join(parts)
 
 
 def _sentences_on_others(result: SweepCases, done: Integers) -> list[str]:

@@ -35,6 +35,9 @@ SHOWN = {
     "spread_ratio": "spread / U",
     "coverage_sigma_given": "covered, %",
 }
+# Costs and rank, with their headings.
+COSTS = {name: name for name in ("positions", "readings", "hours", "observations")}
+COSTS |= {"rank_deficiency": "rank deficiency", "bound_m": "bound, µm"}
 IN_TEXT = ("average", "within_target")
 FIGURE = re.compile(rf"(.+?)_({'|'.join(SHOWN)})(?:_(m|rad|m_or_rad|ratio))?")
 # Quantities, without their parts.
@@ -122,13 +125,11 @@ def columns_of(
     ]
     if not result.done.all():
         columns.append(("status", table["status"].tolist()))
-    for name in ("positions", "readings", "observations", "rank_deficiency"):
+    for name, heading in COSTS.items():
         if (result.figure(name) > 0).any():
-            values = [None if math.isnan(v) else int(v) for v in result.figure(name)[table.index]]
-            columns.append((name.replace("_", " "), values))
-    for heading, name in (("hours", "hours"), ("bound, µm", "bound_m")):
-        if (result.figure(name) > 0.0).any():
-            columns.append((heading, result.figure(name)[table.index].tolist()))
+            costs = result.figure(name)[table.index].tolist()
+            values = [None if math.isnan(v) else int(v) if v.is_integer() else v for v in costs]
+            columns.append((heading, values))
     for name in table.columns:
         match = FIGURE.fullmatch(name)
         if match is None or match[2] not in shown or match[1].removesuffix("_more") not in WHOLE:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from ballplate.extensions.pages.interface import Chart, Html, Trace, chart_svg, figure, legend
@@ -54,27 +53,27 @@ def charts(
                 stated = rows.tolist() if len(rows) <= MOST_POINTS else ()
                 notes = [(described(result, k, column), targets.get(k, "")) for k in stated]
                 dots.append(Trace("dots", style, x[rows], value[rows], notes=notes))
+        drawn = sum(len(trace.x) for trace in dots)
         words = f"{symbol} average, {DESCRIPTIONS.get(symbol, '')}, against {chart.words}"
-        if left_out := result.summary.cells - sum(len(trace.x) for trace in dots):
-            words += f" Failed, missing or undetermined: {number_of(left_out, 'case')}."
+        words += f" Drawn: {drawn} of {number_of(result.summary.cells, 'case')}."
         traces, up = [*chart.traces, *dots], f"{symbol} average, {unit}"
-        found.append(replace(chart, traces=traces, up=up, words=words))
+        found += [replace(chart, traces=traces, up=up, words=words)] if drawn else []
     return found
 
 
 def _frames(result: SweepCases, value: Array, best: Sequence[int]) -> Iterator[tuple[Array, Chart]]:
     """Yield charts with lines and without dots, which are over `x` (rows,)."""
-    size: Any = {"from_zero": True, "height": HEIGHT, "width": WIDTH}
     if best:
         hours, steps = result.figure("hours"), np.repeat(best, 2)
         line = Trace("line", "ink", hours[steps][1:], value[steps][:-1])
-        yield hours, Chart([line], "laboratory time, h", "", "hours; line: the least.", **size)
+        words = "hours. The line is of the smallest for the hours."
+        yield hours, Chart([line], "laboratory time, h", "", words, (), True, HEIGHT, WIDTH)
     for k, axis in enumerate(result.axes):
-        count, names, lines = len(axis.labels), axis.labels, []
+        count, names, words, lines = len(axis.labels), axis.labels, f"{axis.name}.", []
         if count < 2 or not axis.numbers and count > MOST_TEXTS:
             continue
         place = np.array(axis.numbers or range(count), float)
-        order, words = np.argsort(place), f"{axis.name}."
+        order = np.argsort(place)
         if axis.numbers:
             names = tuple(f"{number:g}" for number in axis.numbers)
             averages = averages_along(result, value, k)[:, order]
@@ -82,8 +81,9 @@ def _frames(result: SweepCases, value: Array, best: Sequence[int]) -> Iterator[t
             words += f" Lines: {len(lines)} of {len(averages)} combinations of the other axes."
         elif LETTER * max(map(len, names)) * count > WIDTH:
             words += f" {'; '.join(f'{i + 1}: {name}' for i, name in enumerate(names))}."
-            names = tuple(str(i + 1) for i in range(count))
+            names = tuple(map(str, range(1, count + 1)))
         is_sparse = np.diff(place[order]).min() * WIDTH > 6 * LETTER * np.ptp(place)
         places = list(zip(place.tolist(), names, strict=True)) if is_sparse else ()
         across = f"{axis.name}, {axis.unit}" if axis.unit else axis.name
-        yield place[result.chosen[:, k]], Chart(lines, across, "", words, places, **size)
+        chart = Chart(lines, across, "", words, places, True, HEIGHT, WIDTH)
+        yield place[result.chosen[:, k]], chart

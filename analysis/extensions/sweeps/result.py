@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from ballplate.presentation import Data, MainTable, Result, picked, table_lines
 
-from .answer import answer
+from .answer import answer, criterion
 from .cases import IN_TEXT, MOST_ROWS, SweepCases, columns_of
 
 if TYPE_CHECKING:
@@ -78,9 +78,10 @@ class SweepResult(SweepCases, Result):
 
         :raises ImportError: xarray is missing.
         """
-        names = [axis["column"] for axis in self.definition["axes"]]
+        axes = self.definition["axes"]
+        every = {axis["column"]: axis["values" if axis["unit"] else "labels"] for axis in axes}
         try:
-            return self.table.set_index(names).to_xarray()
+            return self.table.set_index(list(every)).to_xarray().reindex(every)
         except ImportError as error:
             text = "this needs xarray; install it with: python -m pip install 'ballplate[xarray]'"
             raise ImportError(text, name="xarray") from error
@@ -93,6 +94,7 @@ class SweepResult(SweepCases, Result):
         :raises ImportError: matplotlib is missing.
         :raises ValueError: the path has another suffix, or no averages can be compared.
         """
+        from .effects import frontier
         from .sweep_plot import draw_sweep
 
-        return draw_sweep(self, path)
+        return draw_sweep(self, frontier(self, self.figure(criterion(self) or "")), path)

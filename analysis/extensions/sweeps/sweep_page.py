@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import partial
 from pathlib import PurePosixPath
 
@@ -60,13 +60,13 @@ def sweep_page(result: SweepCases) -> str:
     first = [] if found is None else [*found.outstanding, *found.best, *best]
     rows = sorted(list(dict.fromkeys([*first, *range(len(result.table))]))[:MOST_ROWS])
     designs = drawings(result, rows)
-    targets = {row: _id(result, row) for group in designs.values() for row in group}
-
+    cells = result.table["cell"]
+    targets = {row: f"case-{cells[row]}" for group in designs.values() for row in group}
     listed = partial(_table, result, targets)
     left_out = len(result.table) - len(rows)
     more = note(f"Cases not shown here: {left_out}.") if left_out else ""
     notes = element("ul", *(element("li", text) for text in result.shortcomings))
-    sections, drawings_of_all = [], Html()
+    sections, drawn_cases = [], []
     if found is not None and judged is not None:
         verdict, *further = found.sentences
         kind = "verdict" if found.is_good else "verdict bad"
@@ -77,7 +77,9 @@ def sweep_page(result: SweepCases) -> str:
         figures = curves(charts(result, judged, best, targets))
         costs = [figures.pop(0), listed("frontier", best)] if best else []
         axes = [table("effects", EFFECTS, HEADS, effects(result, value), (0, 4)), *figures]
-        drawings_of_all = joined(_designs(result, designs, judged))
+        for text, group in designs.items():
+            cases = (element("p", described(result, k, judged), id=targets[k]) for k in group)
+            drawn_cases.append(element("div", drawn(text, *cases), class_="design"))
         sections = [
             PageSection("answer", "Answer", answered),
             PageSection("frontier", "Uncertainty against hours", joined(costs)),
@@ -87,15 +89,11 @@ def sweep_page(result: SweepCases) -> str:
         cases = joined([listed("cases", rows, SHOWN), more])
         sections.append(PageSection("cases", "Cases", cases))
     sections += [
-        PageSection("designs", "Designs", drawings_of_all),
+        PageSection("designs", "Designs", joined(drawn_cases)),
         PageSection("notes", "Failures and notes", notes if result.shortcomings else Html()),
         PageSection("swept", "What was swept", facts_list(_facts(result))),
     ]
     return written(Page(result.title, sentence(f"{result.headline()}."), sections, FOOT))
-
-
-def _id(result: SweepCases, row: int) -> str:
-    return f"case-{result.table['cell'][row]}"
 
 
 def _outstanding(result: SweepCases, row: int, found: SweepAnswer) -> Html:
@@ -106,13 +104,6 @@ def _outstanding(result: SweepCases, row: int, found: SweepAnswer) -> Html:
         notes.append(note("The assumptions of this case are not assessed."))
     pictures = map(drawn, drawings(result, [row]))
     return element("div", sentence(found.outstanding[row]), *notes, *pictures)
-
-
-def _designs(result: SweepCases, designs: dict[str, list[int]], column: str) -> Iterator[Html]:
-    """Return drawings, each once with all its cases."""
-    for text, rows in designs.items():
-        cases = (element("p", described(result, row, column), id=_id(result, row)) for row in rows)
-        yield element("div", drawn(text, *cases), class_="design")
 
 
 def _table(

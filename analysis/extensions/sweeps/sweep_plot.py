@@ -5,12 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ballplate.presentation import INK, MARKERS, MUTED, SERIES, common_legend, drawing, save
+from ballplate.presentation import MARKERS, MUTED, SERIES, common_legend, drawing, save
 
 from .answer import criterion
 from .cases import SweepCases
 from .curves import STYLES, charts
-from .effects import frontier
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -19,32 +18,26 @@ if TYPE_CHECKING:
 HEIGHT, WIDTH = 280.0, 400.0
 
 
-def draw_sweep(result: SweepCases, path: str | Path | None = None) -> Figure:
-    """Draw a sweep; save to the path, if any.
+def draw_sweep(result: SweepCases, best: list[int], path: str | Path | None) -> Figure:
+    """Draw a sweep whose `best` cases are joined if hours differ; save to the path, if any.
 
     :raises ImportError: matplotlib is missing.
     :raises ValueError: no averages can be compared, or the suffix of the path is unknown.
-    :raises OSError: the file cannot be written.
     """
-    column = criterion(result) or ""
-    best = frontier(result, result.figure(column))
-    shown = charts(result, column, best, {})[: 1 if best else None] if column else []
+    shown = charts(result, criterion(result) or "", best, {})[: 1 if best else None]
     if not shown:
         raise ValueError(f"{result.label} has no averages to compare along an axis")
-    colours = dict(zip(STYLES, SERIES, strict=False)) | {"ink": INK}
-    markers = dict(zip(STYLES, MARKERS, strict=False))
+    looks = dict(zip(STYLES, zip(MARKERS, SERIES, strict=True), strict=False))
     with drawing(HEIGHT, WIDTH * len(shown)) as figure:
         for k, chart in enumerate(shown):
-            axes = figure.add_subplot(1, len(shown), k + 1)
+            axes = figure.add_subplot(1, len(shown), k + 1, xlabel=chart.across, ylabel=chart.up)
             for trace in chart.traces:
-                colour, label = colours.get(trace.style, MUTED), STYLES.get(trace.style)
-                form = f"{markers.get(trace.style, '')}{'' if label else '-'}"
-                axes.plot(trace.x, trace.y, form, color=colour, label=label)
+                form, colour = looks.get(trace.style, ("-", MUTED))
+                axes.plot(trace.x, trace.y, form, color=colour, label=STYLES.get(trace.style))
             if chart.places:
                 axes.set_xticks(*zip(*chart.places, strict=True))
-            axes.set(xlabel=chart.across, ylabel=chart.up)
             axes.set_ylim(bottom=0.0)
             axes.grid(True)
         common_legend(figure, axes, loc="upper center", ncols=len(STYLES))
         figure.subplots_adjust(top=0.88, bottom=0.17)
-        return save(figure, path, "; ".join(chart.words for chart in shown))
+        return save(figure, path, shown[0].words)
