@@ -54,8 +54,10 @@ def answer(result: SweepCases) -> SweepAnswer | None:
     wanted = [(f"Smallest average of {quantity(column)}", known, value)]
     if meets.any():
         order = best_first(~meets, comparable(cost), value)
-        words = f"Fewest {unit}, where known, of the cases that meet the target"
-        wanted.append((words, meets & np.isfinite(cost), cost))
+        priced = meets & np.isfinite(cost)
+        words = f"Fewest {unit} of the cases that meet the target"
+        words += "" if priced.sum() == meets.sum() else " and state them"
+        wanted.append((words, priced, cost))
     elif judged.any():
         order = best_first(-share, value)
         wanted.append(("Nearest to the target", judged, -share))

@@ -78,8 +78,8 @@ def sweep_page(result: SweepCases) -> str:
         costs = [figures.pop(0), listed("frontier", best)] if best else []
         axes = [table("effects", EFFECTS, HEADS, effects(result, value), (0, 4)), *figures]
         for text, group in designs.items():
-            cases = (element("p", described(result, k, judged), id=targets[k]) for k in group)
-            drawn_cases.append(element("div", drawn(text, *cases), class_="design"))
+            texts = [element("p", described(result, k, judged), id=targets[k]) for k in group]
+            drawn_cases.append(element("div", drawn(text, *texts), class_="design"))
         sections = [
             PageSection("answer", "Answer", answered),
             PageSection("frontier", "Uncertainty against hours", joined(costs)),

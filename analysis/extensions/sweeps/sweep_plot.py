@@ -24,7 +24,8 @@ def draw_sweep(result: SweepCases, best: list[int], path: str | Path | None) -> 
     :raises ImportError: matplotlib is missing.
     :raises ValueError: no averages can be compared, or the suffix of the path is unknown.
     """
-    shown = charts(result, criterion(result) or "", best, {})[: 1 if best else None]
+    column = criterion(result)
+    shown = charts(result, column, best, {})[: 1 if best else None] if column else []
     if not shown:
         raise ValueError(f"{result.label} has no averages to compare along an axis")
     looks = dict(zip(STYLES, zip(MARKERS, SERIES, strict=True), strict=False))

@@ -48,7 +48,7 @@ def test_marks_of_a_chart_stand_where_its_numbers_say(x: Any, y: Any, ends: Any,
     assert '<text x="195.0" y="164.0" text-anchor="middle">x, mm<' in chart_svg(chart)
 
 
-@pytest.mark.parametrize(("count", "shown"), [(2, "low"), (3, "many letter…"), (60, "")])
+@pytest.mark.parametrize(("count", "shown"), [(2, "low"), (3, "many letters or …"), (60, "")])
 def test_names_along_a_chart_stand_below_their_places_apart(count: int, shown: str) -> None:
     """In full or by their first letters, otherwise some of their numbers."""
     places = tuple((k, "low" if count == 2 else "many letters or more") for k in range(count))
