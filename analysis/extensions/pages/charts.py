@@ -93,12 +93,10 @@ def _limits(chart: Chart) -> tuple[tuple[float, float], tuple[float, float]]:
     low = min(ends[0], 0.0) if chart.from_zero else ends[0]
     room = 0.06 * ((ends[1] - low) or abs(low) or 1.0)
     vertical = (0.0 if chart.from_zero and low >= 0.0 else low - room, ends[1] + room)
-    low, high = _ends(across)
-    if chart.places:
-        where = sorted(x for x, _ in chart.places)
-        half = 0.5 * min(np.diff(where), default=1.0)
-        return (where[0] - half, where[-1] + half), vertical
-    return (low, high if high > low else low + 1.0), vertical
+    where = np.array([x for x, _ in chart.places])
+    low, high = _ends(where if chart.places else across)
+    beside = 0.5 * ((high - low) / max(len(where) - 1, 1) or 1.0) if chart.places else 0.0
+    return (low - beside, high + beside if high > low or beside else low + 1.0), vertical
 
 
 def _ends(values: Array) -> tuple[float, float]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.presentation import number, percent
 from ballplate.simulator.computing import comparable
 from ballplate.simulator.design import Flags
 from ballplate.simulator.inputs import listing, number_of
@@ -13,7 +12,7 @@ from ballplate.simulator.machines import Integers
 from ballplate.uncertainty import RECORDED
 from numpy.typing import NDArray
 
-from .cases import SweepCases, column_unit
+from .cases import SweepCases, described
 
 # Cases in the table of the best.
 LISTED = 8
@@ -22,7 +21,7 @@ WITHIN = "U6_within_target"
 
 # Quantities to judge cases by: the average of the first that is recorded.
 PREFERRED = ("U6", "U4", "U5", "U1", "U3_lengths", "U2_lengths", "U3", "U2")
-CRITERIA = (*PREFERRED, *(symbol for symbol in RECORDED if symbol not in PREFERRED))
+CRITERIA = tuple(dict.fromkeys((*PREFERRED, *RECORDED)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,15 +62,13 @@ def answer(result: SweepCases) -> SweepAnswer | None:
         wanted.append(("Nearest to the target", judged, -share))
     else:
         order = best_first(~known, value)
-    reasons: dict[int, str] = {}
+    outstanding: dict[int, str] = {}
     for words, mask, figure in wanted:
         alike = mask & (comparable(figure) == comparable(figure)[mask].min(initial=np.inf))
         if rows := done[order[alike[order]]].tolist():
             one_of = f" (one of {len(rows)})" if rows[1:] else ""
-            reasons[rows[0]] = f"{reasons.get(rows[0], '')}{words}{one_of}: "
-    outstanding = {
-        row: f"{words}{described(result, row, column)}." for row, words in reasons.items()
-    }
+            of_case = outstanding.get(rows[0]) or f"{described(result, rows[:1])[0]}."
+            outstanding[rows[0]] = f"{words}{one_of}: {of_case}"
     sentences = [*_verdict(result, meets, judged), *outstanding.values()]
     if not known.any():
         sentences.append(f"Every case leaves some of {quantity(column)} undetermined.")
@@ -100,11 +97,9 @@ def _verdict(result: SweepCases, meets: Flags, judged: Flags) -> list[str]:
 
 def criterion(result: SweepCases) -> str | None:
     """Return the column of the average that cases are judged by; None without one."""
-    for name in CRITERIA:
-        for column in result.table.columns:
-            if column.startswith(f"{name}_average_"):
-                return str(column)
-    return None
+    columns = result.table.columns
+    found = (c for name in CRITERIA for c in columns if c.startswith(f"{name}_average_"))
+    return next(found, None)
 
 
 def quantity(column: str) -> str:
@@ -122,21 +117,6 @@ def best_first(*keys: NDArray[np.generic]) -> Integers:
     """
     *before, value = keys
     return np.lexsort([comparable(value), *reversed(before)])
-
-
-def described(result: SweepCases, row: int, column: str) -> str:
-    """Return a case in a line: number, values of the axes, and figures."""
-    value, share = result.figure(column)[row], result.figure(WITHIN)[row]
-    average = f"{number(1e6 * value, 3)} {column_unit(column.partition('_average_')[2])}"
-    parts = [
-        f"case {result.table['cell'][row]}: {result.words(row)}",
-        f"{quantity(column)} average {average if np.isfinite(value) else 'undetermined'}",
-    ]
-    if np.isfinite(share):
-        parts.append(f"{percent(float(share))} of the lengths within target")
-    counts = [(name, result.figure(name)[row]) for name in ("positions", "observations", "hours")]
-    parts += [f"{round(n, 2):.10g} {name}" for name, n in counts if np.isfinite(n)]
-    return "; ".join(parts)
 
 
 def _sentences_on_others(result: SweepCases, done: Integers) -> list[str]:

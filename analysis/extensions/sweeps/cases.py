@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from ballplate.presentation import shown_unit
+from ballplate.presentation import number, shown_unit, table_rows
 from ballplate.simulator.design import Flags
 from ballplate.simulator.inputs import QUANTITY, exact_number, in_one_line, number_of
 from ballplate.simulator.machines import Array, Integers
@@ -80,10 +80,14 @@ class SweepCases:
         return tuple(map(_axis, self.definition["axes"]))
 
     @cached_property
+    def cells(self) -> Integers:
+        """Indices (cells, axes) of the values of all cases."""
+        return np.array(self.definition["cells"], np.int64).reshape(-1, len(self.axes))
+
+    @cached_property
     def chosen(self) -> Integers:
         """Indices (rows, axes) of each row's values."""
-        cells = np.array(self.definition["cells"], np.int64).reshape(-1, len(self.axes))
-        return cells[self.table["cell"].to_numpy(np.int64)]
+        return self.cells[self.table["cell"].to_numpy(np.int64)]
 
     @cached_property
     def done(self) -> Flags:
@@ -98,11 +102,6 @@ class SweepCases:
         ):
             return np.full(len(self.table), math.nan)
         return np.asarray(self.table[name], float)
-
-    def words(self, row: int) -> str:
-        """Return the axes with their values in a row."""
-        places = zip(self.axes, self.chosen[row].tolist(), strict=True)
-        return ", ".join(f"{axis.name} {axis.labels[k]}" for axis, k in places)
 
     def headline(self) -> str:
         """Numbers of cases."""
@@ -153,6 +152,33 @@ def columns_of(
     return columns
 
 
+def texts_of(
+    result: SweepCases, rows: Iterable[int], shown: Collection[str]
+) -> tuple[list[str], list[list[str]]]:
+    """Return headings and texts of the cells of `columns_of` some rows."""
+    columns = columns_of(result, rows, shown)
+    texts = [
+        ["" if v is None else number(v) if isinstance(v, float) else str(v) for v in row.values()]
+        for row in table_rows(columns, in_units=True)
+    ]
+    return [heading for heading, _ in columns], texts
+
+
+def described(result: SweepCases, rows: Iterable[int]) -> list[str]:
+    """Return a line for each of some cases: its number, its values of the axes, and figures."""
+    heads, texts = texts_of(result, rows, IN_TEXT)
+    found = []
+    for cell, row in zip(result.table["cell"].iloc[list(rows)], texts, strict=True):
+        named = ((*head.partition(", ")[::2], text) for head, text in zip(heads, row, strict=True))
+        words = (
+            f"{name} {text} {unit}".rstrip()
+            for name, unit, text in named
+            if text not in ("", "done")
+        )
+        found.append(f"case {cell}: {'; '.join(words)}")
+    return found
+
+
 def column_unit(suffix: str) -> str:
     """Return the printed unit of a column from the end of its name.
 
@@ -173,6 +199,6 @@ def _axis(stored: dict[str, Any]) -> ShownAxis:
     parts = [(match[1], (match[2] or "").strip()) for match in matches if match is not None]
     units = {each for _, each in parts}
     if len(units) == 1 and len(parts) == len(labels):
-        numbers = tuple(float(exact_number(number)) for number, _ in parts)
+        numbers = tuple(float(exact_number(one)) for one, _ in parts)
         return ShownAxis(name, labels, numbers, units.pop() or unit)
     return ShownAxis(name, labels, tuple(map(float, stored["values"])), unit)

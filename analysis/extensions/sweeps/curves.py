@@ -6,34 +6,25 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from ballplate.extensions.pages.interface import Chart, Html, Trace, chart_svg, figure, legend
+from ballplate.extensions.pages.interface import Chart, Trace
 from ballplate.simulator.inputs import number_of
 from ballplate.simulator.machines import Array
 from ballplate.uncertainty import DESCRIPTIONS
 
-from .answer import WITHIN, described, quantity
-from .cases import SweepCases, column_unit
+from .answer import WITHIN, quantity
+from .cases import SweepCases, column_unit, described
 from .effects import averages_along
 
 # Styles of dots, and their words.
 STYLES = {"s0": "meets the target", "s1": "does not meet the target", "s2": "no target"}
+
+COLOURS = "Blue: meets the target; orange: does not; green: no target."
 
 # Of a chart, and of a letter.
 WIDTH, HEIGHT, LETTER = 800.0, 260.0, 6.0
 
 # Texts of an axis that are drawn, lines of a chart, and dots that state their case.
 MOST_TEXTS, MOST_LINES, MOST_POINTS = 30, 40, 1000
-
-
-def curves(charts: Sequence[Chart]) -> list[Html]:
-    """Return charts as figures with legends."""
-    found = []
-    for chart in charts:
-        styles = [trace.style for trace in chart.traces if trace.kind == "dots"]
-        entries = [("dots", style, STYLES[style]) for style in styles]
-        shown = [legend(*entries)] if len(entries) > 1 else []
-        found.append(figure(chart.words, *shown, chart_svg(chart)))
-    return found
 
 
 def charts(
@@ -44,18 +35,19 @@ def charts(
     rows.
     """
     value, share = 1e6 * result.figure(column), result.figure(WITHIN)
+    texts = described(result, range(len(value))) if len(value) <= MOST_POINTS else []
+    notes = [(text, targets.get(row, "")) for row, text in enumerate(texts)]
     symbol, unit = quantity(column), column_unit(column.partition("_average_")[2])
     found = []
     for x, chart in _frames(result, value, best):
         dots = []
         for style, mask in zip(STYLES, (share == 1.0, share < 1.0, np.isnan(share)), strict=True):
             if len(rows := np.flatnonzero(mask & np.isfinite(x + value))):
-                stated = rows.tolist() if len(rows) <= MOST_POINTS else ()
-                notes = [(described(result, k, column), targets.get(k, "")) for k in stated]
-                dots.append(Trace("dots", style, x[rows], value[rows], notes=notes))
+                mine = [notes[k] for k in rows] if notes else ()
+                dots.append(Trace("dots", style, x[rows], value[rows], notes=mine))
         drawn = sum(len(trace.x) for trace in dots)
         words = f"{symbol} average, {DESCRIPTIONS.get(symbol, '')}, against {chart.words}"
-        words += f" Drawn: {drawn} of {number_of(result.summary.cells, 'case')}."
+        words += f" Drawn: {drawn} of {number_of(result.summary.cells, 'case')}. {COLOURS}"
         traces, up = [*chart.traces, *dots], f"{symbol} average, {unit}"
         found += [replace(chart, traces=traces, up=up, words=words)] if drawn else []
     return found

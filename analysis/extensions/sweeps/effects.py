@@ -35,8 +35,7 @@ def averages_along(result: SweepCases, value: Array, k: int) -> Array:
     """Return `value` (rows,) of finished cases by combination of the other axes' values and by
     value of axis `k`; NaN of cases that are missing.
     """
-    cells = np.array(result.definition["cells"], np.int64).reshape(-1, len(result.axes))
-    others, which = np.unique(np.delete(cells, k, axis=1), axis=0, return_inverse=True)
+    others, which = np.unique(np.delete(result.cells, k, axis=1), axis=0, return_inverse=True)
     averages = np.full((len(others), len(result.axes[k].labels)), np.nan)
     rows = np.flatnonzero(result.done)
     places = which.ravel()[result.table["cell"].to_numpy()[rows]]
@@ -50,8 +49,6 @@ def frontier(result: SweepCases, value: Array) -> list[int]:
     """
     hours, value = comparable(result.figure("hours")), comparable(value)
     known = np.flatnonzero(np.isfinite(hours + value))
-    found: list[int] = []
-    for row in known[np.lexsort([value[known], hours[known]])].tolist():
-        if not found or value[row] < value[found[-1]]:
-            found.append(row)
-    return found if np.unique(hours[known]).size > 1 else []
+    order = known[np.lexsort([value[known], hours[known]])]
+    is_less = np.diff(np.minimum.accumulate(value[order]), prepend=np.inf) < 0.0
+    return order[is_less].tolist() if np.unique(hours[known]).size > 1 else []

@@ -10,19 +10,20 @@ from ballplate.extensions.pages.interface import (
     Html,
     Page,
     PageSection,
+    chart_svg,
     element,
     facts_list,
+    figure,
     joined,
     note,
     sentence,
     table,
     written,
 )
-from ballplate.presentation import number, table_rows
 
-from .answer import SweepAnswer, answer, criterion, described
-from .cases import IN_TEXT, MOST_ROWS, SHOWN, SweepCases, columns_of
-from .curves import charts, curves
+from .answer import SweepAnswer, answer, criterion
+from .cases import IN_TEXT, MOST_ROWS, SHOWN, SweepCases, described, texts_of
+from .curves import charts
 from .design_drawings import drawings, drawn
 from .effects import effects, frontier
 
@@ -45,6 +46,8 @@ HEADS = (
     "combinations with two or more values",
     "with all values",
 )
+
+IN_WORDS = ("status", "given", "unspanned")
 
 # Temporary sweep file of the studio.
 MADE_IN_STUDIO = ".ballplate-sweep.yaml"
@@ -74,11 +77,13 @@ def sweep_page(result: SweepCases) -> str:
         pictures = (_outstanding(result, row, found) for row in found.outstanding)
         shown = element("div", *pictures, class_="picked"), *others, listed("best", found.best)
         answered = joined([element("p", verdict, class_=kind), *shown, COSTS])
-        figures = curves(charts(result, judged, best, targets))
+        drawn_charts = charts(result, judged, best, targets)
+        figures = [figure(chart.words, chart_svg(chart)) for chart in drawn_charts]
         costs = [figures.pop(0), listed("frontier", best)] if best else []
         axes = [table("effects", EFFECTS, HEADS, effects(result, value), (0, 4)), *figures]
         for text, group in designs.items():
-            texts = [element("p", described(result, k, judged), id=targets[k]) for k in group]
+            lines = zip(group, described(result, group), strict=True)
+            texts = (element("p", line, id=targets[k]) for k, line in lines)
             drawn_cases.append(element("div", drawn(text, *texts), class_="design"))
         sections = [
             PageSection("answer", "Answer", answered),
@@ -99,7 +104,7 @@ def sweep_page(result: SweepCases) -> str:
 def _outstanding(result: SweepCases, row: int, found: SweepAnswer) -> Html:
     """Return a case with what its figures take for granted, and its design."""
     given = result.table["given"][row]
-    notes = [note(f"Given {given}.")] if given else []
+    notes = []
     if (row != found.best[0] or result.summary.left) and "assess" not in given:
         notes.append(note("The assumptions of this case are not assessed."))
     pictures = map(drawn, drawings(result, [row]))
@@ -114,17 +119,13 @@ def _table(
     shown: Collection[str] = IN_TEXT,
 ) -> Html:
     """Return a table of cases that leads to their designs."""
-    columns = columns_of(result, rows, shown)
-    texts = [
-        ["" if v is None else number(v) if isinstance(v, float) else str(v) for v in row.values()]
-        for row in table_rows(columns, in_units=True)
-    ]
+    heads, texts = texts_of(result, rows, shown)
     for row, cells in zip(rows, texts, strict=True):
         case = str(result.table["cell"][row])
         cells.insert(0, element("a", case, href=f"#{targets[row]}") if row in targets else case)
-    words = [k + 1 for k, (_, values) in enumerate(columns) if isinstance(values[0], str)]
-    heads = ["case", *(heading for heading, _ in columns)]
-    return table(name, CAPTIONS[name], heads, texts, words, is_long=len(texts) > LISTED)
+    words = [k + 1 for k, head in enumerate(heads) if k < len(result.axes) or head in IN_WORDS]
+    caption = CAPTIONS[name]
+    return table(name, caption, ["case", *heads], texts, words, is_long=len(texts) > LISTED)
 
 
 def _source(path: str) -> tuple[str, str]:

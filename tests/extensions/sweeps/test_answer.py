@@ -118,13 +118,13 @@ def _assert_first(
         assert text.startswith("No case has a target")
     elif not meeting:
         assert text.startswith(("None of the", wording.THE_ONLY_SETTING_DOES_NOT_MEET))
-        assert wording.OF_THE_LENGTHS in text
+        assert wording.WITHIN_TARGET in text
     else:
         assert re.match(rf"{len(meeting)} of {len(shares)} cases? meets? the target", text)
         fewest = min(float(row["observations"]) for row in meeting)
         cheapest = [row for row in meeting if float(row["observations"]) == fewest]
         best = min(float(row[average]) for row in cheapest)
-        (said,) = re.findall(rf"{wording.FEWEST}([^:]*): .*?; (\d+) observations", text)
+        (said,) = re.findall(rf"{wording.FEWEST}([^:]*): .*?; observations (\d+);", text)
         assert said == (_one_of(len(cheapest)), f"{fewest:.0f}")
         chosen = [row for row in cheapest if float(row[average]) == best]
         assert first in [_labels(row) for row in chosen]
@@ -135,7 +135,7 @@ def _assert_first(
         best = min(float(row[average]) for row in known)
         tied = sum(float(row[average]) == best for row in known) - 1
         said = f"Smallest average of {symbol}{_one_of(tied + 1)}: case"
-        assert said in text and f"{symbol} average {1e6 * best:.2f} µm" in text
+        assert said in text and f"{symbol} average {1e6 * best:.3f} µm" in text
         assert first in [_labels(row) for row in known if float(row[average]) == best]
     else:
         assert f"Every case leaves some of {symbol} undetermined" in text

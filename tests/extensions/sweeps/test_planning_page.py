@@ -105,7 +105,7 @@ def test_the_cheapest_case_is_that_of_known_hours(tmp_path: Path) -> None:
     told = answer(result)
     least = hours[share == 1.0].min()
     assert told is not None and told.best[0] in told.outstanding
-    assert hours[told.best[0]] == least and f"{least:g} hours." in told.outstanding[told.best[0]]
+    assert hours[told.best[0]] == least and f"hours {least:.3f};" in told.outstanding[told.best[0]]
     assert result.lines()[2:5][0].endswith("the target uncertainty with all lengths.")
     # Hours that are unknown are no fewest ones.
     table = result.table.copy()
@@ -121,7 +121,7 @@ def test_the_cheapest_case_is_that_of_known_hours(tmp_path: Path) -> None:
     old = [axis("hours", ["day", "night"]), axis("k", ["1"], [1.0], "1")]
     rows = [done(k, {"U6_average_m": 1e-6, "U6_within_target": 1.0}) for k in range(2)]
     told = answer(made_up_result(tmp_path / "old.sqlite", "old", old, rows))
-    assert told is not None and "one of 2): case 0: hours day, k 1" in told.sentences[1]
+    assert told is not None and "one of 2): case 0: hours day; k 1; " in told.sentences[1]
 
 
 def test_dots_lead_to_designs_that_are_drawn_once(tmp_path: Path) -> None:
@@ -134,8 +134,10 @@ def test_dots_lead_to_designs_that_are_drawn_once(tmp_path: Path) -> None:
     assert len(dots) == 4 * np.isfinite(value).sum() and len(found.of("figure")) >= 4 + 3
     for target, words in dots:
         row = int(np.flatnonzero(result.table["cell"] == int(target.removeprefix("case-")))[0])
-        assert words.startswith(f"case {target[5:]}: {result.words(row)}; U6 average")
-        assert f"{1e6 * value[row]:.3g}" in words
+        chosen = zip(result.axes, result.chosen[row], strict=True)
+        told = "; ".join(f"{one.name} {one.labels[k]}" for one, k in chosen)
+        assert words.startswith(f"case {target[5:]}: {told}; hours ")
+        assert f"U6 average {1e6 * value[row]:.3g}" in words
     ids = [one["id"] for one in found.of("p") if "id" in one]
     assert sorted(ids) == sorted(f"case-{cell}" for cell in result.table["cell"][result.done])
     assert text.count('class="design"') == 3 and "level &lt;0&gt;" in text

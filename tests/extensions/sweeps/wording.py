@@ -19,7 +19,7 @@ NO_TARGET_TO_BE_COMPARED = "no target to be compared with"
 NO_VARIANT_IN_QUICKSTART_YAML = (
     's.yaml:3:10: variant: no variant "mny" in quickstart.yaml; did you mean "many"?'
 )
-OF_THE_LENGTHS = "25 % of the lengths"
+WITHIN_TARGET = "U6 within target 25.00 %"
 OUTSIDE_THE_FOLDERS_OF_THE_SWEEP = "outside the folders of the sweep"
 OUTSIDE_THE_FOLDERS_OF_THE_SWEEP_AND_ITS_BASE = "outside the folders of the sweep and its base"
 NAME_A_NEW_FILE = "name a new file with ballplate sweep --store to recompute"
