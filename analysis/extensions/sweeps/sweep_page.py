@@ -123,9 +123,9 @@ def _table(
     for row, cells in zip(rows, texts, strict=True):
         case = str(result.table["cell"][row])
         cells.insert(0, element("a", case, href=f"#{targets[row]}") if row in targets else case)
-    words = [k + 1 for k, head in enumerate(heads) if k < len(result.axes) or head in IN_WORDS]
+    words = [k for k, head in enumerate(heads, 1) if k <= len(result.axes) or head in IN_WORDS]
     caption = CAPTIONS[name]
-    return table(name, caption, ["case", *heads], texts, words, is_long=len(texts) > LISTED)
+    return table(name, caption, ["case", *heads], texts, [0, *words], is_long=len(texts) > LISTED)
 
 
 def _source(path: str) -> tuple[str, str]:
