@@ -166,16 +166,10 @@ def _trace(trace: Trace, scale: _Scale) -> Html:
         path = "".join(f"M{x[k]:g} {y[k]:g}h0" for run in runs for k in run)
     elif trace.upper is not None:
         top = np.round(scale.y(trace.upper), 1).tolist()
-        path = "".join(
-            _line([x[k] for k in run], [y[k] for k in run])
-            + _line([x[k] for k in reversed(run)], [top[k] for k in reversed(run)]).replace(
-                "M", "L"
-            )
-            + "Z"
-            for run in runs
-        )
+        back = (_line(x, top, run[::-1]).replace("M", "L") for run in runs)
+        path = "".join(f"{_line(x, y, run)}{end}Z" for run, end in zip(runs, back, strict=True))
     else:
-        path = "".join(_line([x[k] for k in run], [y[k] for k in run]) for run in runs)
+        path = "".join(_line(x, y, run) for run in runs)
     return _path(path, f"{trace.kind} {trace.style}")
 
 
@@ -194,9 +188,8 @@ def _runs(is_finite: np.ndarray) -> list[list[int]]:
     ]
 
 
-def _line(x: Sequence[float], y: Sequence[float]) -> str:
-    points = [f"{a:g} {b:g}" for a, b in zip(x, y, strict=True)]
-    return f"M{'L'.join(points)}" if points else ""
+def _line(x: Sequence[float], y: Sequence[float], run: Sequence[int]) -> str:
+    return f"M{'L'.join(f'{x[k]:g} {y[k]:g}' for k in run)}"
 
 
 def _path(d: str, kind: str) -> Html:

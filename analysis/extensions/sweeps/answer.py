@@ -18,6 +18,7 @@ from .cases import SweepCases, described
 LISTED = 8
 
 WITHIN = "U6_within_target"
+NO_TARGET = "No case has a target uncertainty for its lengths."
 
 # Quantities to judge cases by: the average of the first that is recorded.
 PREFERRED = ("U6", "U4", "U5", "U1", "U3_lengths", "U2_lengths", "U3", "U2")
@@ -46,17 +47,15 @@ def answer(result: SweepCases) -> SweepAnswer | None:
         return None
     value, share, cost = (result.figure(name)[done] for name in (column, WITHIN, "hours"))
     meets, judged, known = share == 1.0, np.isfinite(share), np.isfinite(value)
-    unit = "laboratory hours"
+    unit = "known laboratory hours"
     if not np.isfinite(cost[meets]).any():
         unit, cost = "observations", result.figure("observations")[done]
     # Cases to find: by a figure, among some.
     wanted = [(f"Smallest average of {quantity(column)}", known, value)]
     if meets.any():
         order = best_first(~meets, comparable(cost), value)
-        priced = meets & np.isfinite(cost)
         words = f"Fewest {unit} of the cases that meet the target"
-        words += "" if priced.sum() == meets.sum() else " and state them"
-        wanted.append((words, priced, cost))
+        wanted.append((words, meets & np.isfinite(cost), cost))
     elif judged.any():
         order = best_first(-share, value)
         wanted.append(("Nearest to the target", judged, -share))
@@ -87,10 +86,9 @@ def _verdict(result: SweepCases, meets: Flags, judged: Flags) -> list[str]:
         verdict = f"{found} of {_cases(count)} {_verb(found, 'meet')}"
     elif count:
         verdict = f"None of the {count} cases meets" if count > 1 else "The only case does not meet"
-    elif WITHIN.partition("_")[0] in result.definition["record"]:
-        return ["No case has a target uncertainty for its lengths."]
     else:
-        return ["U6 is not recorded, so that no case is compared with a target uncertainty."]
+        is_recorded = "U6" in result.definition["record"]
+        return [NO_TARGET if is_recorded else f"U6 is not recorded. {NO_TARGET}"]
     more = f"{_cases(apart)} more {_verb(apart, 'have')} no target to be compared with."
     return [f"{verdict} the target uncertainty with all lengths.", *[more] * (apart > 0)]
 

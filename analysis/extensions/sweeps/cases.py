@@ -35,9 +35,16 @@ SHOWN = {
     "spread_ratio": "spread / U",
     "coverage_sigma_given": "covered, %",
 }
+SILENT = ("", "done")
 # Costs and rank, with their headings.
-COSTS = {name: name for name in ("positions", "readings", "hours", "observations")}
-COSTS |= {"rank_deficiency": "rank deficiency", "bound_m": "bound, µm"}
+COSTS = {
+    "positions": "positions",
+    "readings": "readings",
+    "hours": "hours",
+    "observations": "observations",
+    "rank_deficiency": "rank deficiency",
+    "bound_m": "bound, µm",
+}
 IN_TEXT = ("average", "within_target")
 FIGURE = re.compile(rf"(.+?)_({'|'.join(SHOWN)})(?:_(m|rad|m_or_rad|ratio))?")
 # Quantities, without their parts.
@@ -80,14 +87,10 @@ class SweepCases:
         return tuple(map(_axis, self.definition["axes"]))
 
     @cached_property
-    def cells(self) -> Integers:
-        """Indices (cells, axes) of the values of all cases."""
-        return np.array(self.definition["cells"], np.int64).reshape(-1, len(self.axes))
-
-    @cached_property
     def chosen(self) -> Integers:
         """Indices (rows, axes) of each row's values."""
-        return self.cells[self.table["cell"].to_numpy(np.int64)]
+        cells = np.array(self.definition["cells"], np.int64).reshape(-1, len(self.axes))
+        return cells[self.table["cell"].to_numpy(np.int64)]
 
     @cached_property
     def done(self) -> Flags:
@@ -161,21 +164,17 @@ def texts_of(
         ["" if v is None else number(v) if isinstance(v, float) else str(v) for v in row.values()]
         for row in table_rows(columns, in_units=True)
     ]
-    return [heading for heading, _ in columns], texts
+    return list(dict(columns)), texts
 
 
 def described(result: SweepCases, rows: Iterable[int]) -> list[str]:
     """Return a line for each of some cases: its number, its values of the axes, and figures."""
     heads, texts = texts_of(result, rows, IN_TEXT)
-    found = []
+    names, found = [head.partition(", ") for head in heads], []
     for cell, row in zip(result.table["cell"].iloc[list(rows)], texts, strict=True):
-        named = ((*head.partition(", ")[::2], text) for head, text in zip(heads, row, strict=True))
-        words = (
-            f"{name} {text} {unit}".rstrip()
-            for name, unit, text in named
-            if text not in ("", "done")
-        )
-        found.append(f"case {cell}: {'; '.join(words)}")
+        pairs = zip(names, row, strict=True)
+        words = (f"{name} {text} {unit}" for (name, _, unit), text in pairs if text not in SILENT)
+        found.append(f"case {cell}: {'; '.join(map(str.rstrip, words))}")
     return found
 
 

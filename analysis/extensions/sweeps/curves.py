@@ -45,7 +45,7 @@ def charts(
             if len(rows := np.flatnonzero(mask & np.isfinite(x + value))):
                 mine = [notes[k] for k in rows] if notes else ()
                 dots.append(Trace("dots", style, x[rows], value[rows], notes=mine))
-        drawn = sum(len(trace.x) for trace in dots)
+        drawn = np.isfinite(x + value).sum()
         words = f"{symbol} average, {DESCRIPTIONS.get(symbol, '')}, against {chart.words}"
         words += f" Drawn: {drawn} of {number_of(result.summary.cells, 'case')}. {COLOURS}"
         traces, up = [*chart.traces, *dots], f"{symbol} average, {unit}"
@@ -61,21 +61,22 @@ def _frames(result: SweepCases, value: Array, best: Sequence[int]) -> Iterator[t
         words = "hours. The line is of the smallest for the hours."
         yield hours, Chart([line], "laboratory time, h", "", words, (), True, HEIGHT, WIDTH)
     for k, axis in enumerate(result.axes):
-        count, names, words, lines = len(axis.labels), axis.labels, f"{axis.name}.", []
+        count, words, lines = len(axis.labels), f"{axis.name}.", []
         if count < 2 or not axis.numbers and count > MOST_TEXTS:
             continue
+        names = [f"{number:g}" for number in axis.numbers] or list(axis.labels)
         place = np.array(axis.numbers or range(count), float)
         order = np.argsort(place)
+        gap = np.diff(place[order]).min() / np.ptp(place)
+        fits = gap * WIDTH > LETTER * max(map(len, names))
         if axis.numbers:
-            names = tuple(f"{number:g}" for number in axis.numbers)
             averages = averages_along(result, value, k)[:, order]
             lines = [Trace("line", "faint thin", place[order], y) for y in averages[:MOST_LINES]]
             words += f" Lines: {len(lines)} of {len(averages)} combinations of the other axes."
-        elif LETTER * max(map(len, names)) * count > WIDTH:
-            words += f" {'; '.join(f'{i + 1}: {name}' for i, name in enumerate(names))}."
-            names = tuple(map(str, range(1, count + 1)))
-        is_sparse = np.diff(place[order]).min() * WIDTH > 6 * LETTER * np.ptp(place)
-        places = list(zip(place.tolist(), names, strict=True)) if is_sparse else ()
+        else:
+            words += f" In order: {'; '.join(names)}."
+        places = list(zip(place.tolist(), names, strict=True))
         across = f"{axis.name}, {axis.unit}" if axis.unit else axis.name
-        chart = Chart(lines, across, "", words, places, True, HEIGHT, WIDTH)
+        shown = places if fits or not axis.numbers else ()
+        chart = Chart(lines, across, "", words, shown, True, HEIGHT, WIDTH)
         yield place[result.chosen[:, k]], chart

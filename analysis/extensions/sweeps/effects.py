@@ -32,15 +32,16 @@ def effects(result: SweepCases, value: Array) -> list[list[str]]:
 
 
 def averages_along(result: SweepCases, value: Array, k: int) -> Array:
-    """Return `value` (rows,) of finished cases by combination of the other axes' values and by
-    value of axis `k`; NaN of cases that are missing.
+    """Return `value` (rows,) by combination of the other axes' values and by value of axis `k`; NaN
+    of cases that are missing.
     """
-    others, which = np.unique(np.delete(result.cells, k, axis=1), axis=0, return_inverse=True)
-    averages = np.full((len(others), len(result.axes[k].labels)), np.nan)
-    rows = np.flatnonzero(result.done)
-    places = which.ravel()[result.table["cell"].to_numpy()[rows]]
-    averages[places, result.chosen[rows, k]] = value[rows]
-    return averages
+    import pandas
+
+    others = list(map(str, np.delete(result.chosen, k, axis=1).tolist()))
+    frame = pandas.DataFrame({"others": others, "at": result.chosen[:, k], "value": value})
+    places = range(len(result.axes[k].labels))
+    wide = frame.pivot(index="others", columns="at", values="value")
+    return wide.reindex(columns=places).to_numpy(float)
 
 
 def frontier(result: SweepCases, value: Array) -> list[int]:
@@ -51,4 +52,4 @@ def frontier(result: SweepCases, value: Array) -> list[int]:
     known = np.flatnonzero(np.isfinite(hours + value))
     order = known[np.lexsort([value[known], hours[known]])]
     is_less = np.diff(np.minimum.accumulate(value[order]), prepend=np.inf) < 0.0
-    return order[is_less].tolist() if np.unique(hours[known]).size > 1 else []
+    return order[is_less].tolist() if len(set(hours[known])) > 1 else []

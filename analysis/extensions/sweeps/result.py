@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from ballplate.presentation import Data, MainTable, Result, picked, table_lines
 
-from .answer import answer, criterion
+from .answer import answer
 from .cases import IN_TEXT, MOST_ROWS, SweepCases, columns_of
 
 if TYPE_CHECKING:
@@ -94,7 +94,6 @@ class SweepResult(SweepCases, Result):
         :raises ImportError: matplotlib is missing.
         :raises ValueError: the path has another suffix, or no averages can be compared.
         """
-        from .effects import frontier
         from .sweep_plot import draw_sweep
 
-        return draw_sweep(self, frontier(self, self.figure(criterion(self) or "")), path)
+        return draw_sweep(self, path)

@@ -21,7 +21,7 @@ from ballplate.extensions.pages.interface import (
     written,
 )
 
-from .answer import SweepAnswer, answer, criterion
+from .answer import answer, criterion
 from .cases import IN_TEXT, MOST_ROWS, SHOWN, SweepCases, described, texts_of
 from .curves import charts
 from .design_drawings import drawings, drawn
@@ -35,7 +35,10 @@ CAPTIONS = {
     "frontier": "Cases of which no other has less uncertainty in as few hours",
     "cases": "Cases by number",
 }
-COSTS = note("Observations are readings and certified values.")
+COSTS = note(
+    "Observations are readings and certified values. Assumptions are assessed for the first case of"
+    " this table only, when all cases are done."
+)
 EFFECTS = "Largest average over smallest along each axis, for each combination of the others"
 HEADS = (
     "axis",
@@ -74,7 +77,10 @@ def sweep_page(result: SweepCases) -> str:
         verdict, *further = found.sentences
         kind = "verdict" if found.is_good else "verdict bad"
         others = (sentence(each) for each in further if each not in found.outstanding.values())
-        pictures = (_outstanding(result, row, found) for row in found.outstanding)
+        pictures = (
+            element("div", sentence(line), *map(drawn, drawings(result, [row])))
+            for row, line in found.outstanding.items()
+        )
         shown = element("div", *pictures, class_="picked"), *others, listed("best", found.best)
         answered = joined([element("p", verdict, class_=kind), *shown, COSTS])
         drawn_charts = charts(result, judged, best, targets)
@@ -101,16 +107,6 @@ def sweep_page(result: SweepCases) -> str:
     return written(Page(result.title, sentence(f"{result.headline()}."), sections, FOOT))
 
 
-def _outstanding(result: SweepCases, row: int, found: SweepAnswer) -> Html:
-    """Return a case with what its figures take for granted, and its design."""
-    given = result.table["given"][row]
-    notes = []
-    if (row != found.best[0] or result.summary.left) and "assess" not in given:
-        notes.append(note("The assumptions of this case are not assessed."))
-    pictures = map(drawn, drawings(result, [row]))
-    return element("div", sentence(found.outstanding[row]), *notes, *pictures)
-
-
 def _table(
     result: SweepCases,
     targets: Mapping[int, str],
@@ -128,23 +124,14 @@ def _table(
     return table(name, caption, ["case", *heads], texts, [0, *words], is_long=len(texts) > LISTED)
 
 
-def _source(path: str) -> tuple[str, str]:
-    """Return the source of a sweep, from its path in the store.
-
-    >>> _source("plates/sizes.yaml"), _source("plates/.ballplate-sweep.yaml")
-    (('Sweep file', 'plates/sizes.yaml'), ('Sweep', 'made in the studio'))
-    """
-    # Readers cannot look up a temporary file.
-    if PurePosixPath(path).name == MADE_IN_STUDIO:
-        return "Sweep", "made in the studio"
-    return "Sweep file", path
-
-
 def _facts(result: SweepCases) -> list[tuple[str, str]]:
     stored = result.definition
     base = stored["experiment"].get("title", "") if isinstance(stored["experiment"], dict) else ""
+    source = stored["source"]
+    # Readers cannot look up a temporary file.
+    is_made = PurePosixPath(source).name == MADE_IN_STUDIO
     facts = [
-        _source(stored["source"]),
+        ("Sweep", "made in the studio") if is_made else ("Sweep file", source),
         ("Experiment", f"{stored['base']}: {base}" if base else stored["base"]),
     ]
     for axis in result.axes:

@@ -10,6 +10,7 @@ from ballplate.presentation import MARKERS, MUTED, SERIES, common_legend, drawin
 from .answer import criterion
 from .cases import SweepCases
 from .curves import STYLES, charts
+from .effects import frontier
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -18,13 +19,14 @@ if TYPE_CHECKING:
 HEIGHT, WIDTH = 280.0, 400.0
 
 
-def draw_sweep(result: SweepCases, best: list[int], path: str | Path | None) -> Figure:
-    """Draw a sweep whose `best` cases are joined if hours differ; save to the path, if any.
+def draw_sweep(result: SweepCases, path: str | Path | None) -> Figure:
+    """Draw a sweep; save to the path, if any.
 
     :raises ImportError: matplotlib is missing.
     :raises ValueError: no averages can be compared, or the suffix of the path is unknown.
     """
-    column = criterion(result)
+    column = criterion(result) or ""
+    best = frontier(result, result.figure(column))
     shown = charts(result, column, best, {})[: 1 if best else None] if column else []
     if not shown:
         raise ValueError(f"{result.label} has no averages to compare along an axis")

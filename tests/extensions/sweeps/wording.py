@@ -31,7 +31,6 @@ THE_AXIS_CHOOSES_THE_VARIANT_ALREADY = (
 THE_CLUSTER_HAS_NO_WORKERS = "the cluster has no workers; start some with: dask worker"
 FEWEST = "Fewest observations of the cases that meet the target"
 FORTY_LINES = "Lines: 40 of 400 combinations"
-NOT_ASSESSED = "The assumptions of this case are not assessed."
 THE_ONLY_SETTING_DOES_NOT_MEET = "The only case does not meet"
 THE_PROCESS_THAT_COMPUTED_IT_WAS = "the process that computed it was ended"
 THE_SAME_COMMAND_CONTINUES_FROM_THERE = "the same command continues from there"
