@@ -44,6 +44,8 @@ COSTS = {
     "observations": "observations",
     "rank_deficiency": "rank deficiency",
     "bound_m": "bound, µm",
+    "distance_error_rms_m": "errors of distances, rms, µm",
+    "distance_error_bias_m": "bias, µm",
 }
 IN_TEXT = ("average", "within_target")
 FIGURE = re.compile(rf"(.+?)_({'|'.join(SHOWN)})(?:_(m|rad|m_or_rad|ratio))?")

@@ -61,7 +61,7 @@ def run(options: Namespace) -> int:
     with closing(open_store(options.store, damaged=True)) as store:
         number, defined = chosen_sweep(store, options.sweep)
         stored = results(store, number, len(defined["cells"]))
-        table = frame_of(stored, defined)
+        table = frame_of(stored, defined).drop(columns="drawing", errors="ignore")
     if stored.damaged:
         counted = number_of(len(stored.damaged), "unreadable case")
         first, fault = min(stored.damaged.items())

@@ -60,7 +60,7 @@ class SweepResult(SweepCases, Result):
         """Return one mapping per case, with its axes' values and its results; None for missing
         ones.
         """
-        table = self.table.astype(object)
+        table = self.to_frame().astype(object)
         return [
             {str(k): v for k, v in row.items()}
             for row in table.where(table.notna(), None).to_dict("records")
@@ -70,7 +70,7 @@ class SweepResult(SweepCases, Result):
         return columns_of(self, range(len(self.table))), range(len(self.table))
 
     def to_frame(self) -> pandas.DataFrame:
-        return self.table
+        return self.table.drop(columns="drawing", errors="ignore")
 
     def to_xarray(self) -> xarray.Dataset:
         """The table with a dimension for each axis, in metres, radians or texts as in `to_frame`;
@@ -81,7 +81,7 @@ class SweepResult(SweepCases, Result):
         axes = self.definition["axes"]
         every = {axis["column"]: axis["values" if axis["unit"] else "labels"] for axis in axes}
         try:
-            return self.table.set_index(list(every)).to_xarray().reindex(every)
+            return self.to_frame().set_index(list(every)).to_xarray().reindex(every)
         except ImportError as error:
             text = "this needs xarray; install it with: python -m pip install 'ballplate[xarray]'"
             raise ImportError(text, name="xarray") from error

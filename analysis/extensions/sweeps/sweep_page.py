@@ -26,6 +26,7 @@ from .cases import IN_TEXT, MOST_ROWS, SHOWN, SweepCases, described, texts_of
 from .curves import charts
 from .design_drawings import drawings, drawn
 from .effects import effects, frontier
+from .temporary import TEMPORARY
 
 # Values of an axis in the list of facts.
 LISTED = 12
@@ -37,7 +38,7 @@ CAPTIONS = {
 }
 COSTS = note(
     "Observations are readings and certified values. Assumptions are assessed for the first case of"
-    " this table only, when all cases are done."
+    " this table and those above it only, when all cases are done."
 )
 EFFECTS = "Largest average over smallest along each axis, for each combination of the others"
 HEADS = (
@@ -51,9 +52,6 @@ HEADS = (
 )
 
 IN_WORDS = ("status", "given", "unspanned")
-
-# Temporary sweep file of the studio.
-MADE_IN_STUDIO = ".ballplate-sweep.yaml"
 
 FOOT = "Standard uncertainties throughout; ballplate sweep --export has all figures and digits."
 
@@ -129,9 +127,9 @@ def _facts(result: SweepCases) -> list[tuple[str, str]]:
     base = stored["experiment"].get("title", "") if isinstance(stored["experiment"], dict) else ""
     source = stored["source"]
     # Readers cannot look up a temporary file.
-    is_made = PurePosixPath(source).name == MADE_IN_STUDIO
+    is_made = PurePosixPath(source).name == TEMPORARY
     facts = [
-        ("Sweep", "made in the studio") if is_made else ("Sweep file", source),
+        ("Sweep", "in Python or the studio") if is_made else ("Sweep file", source),
         ("Experiment", f"{stored['base']}: {base}" if base else stored["base"]),
     ]
     for axis in result.axes:

@@ -189,7 +189,7 @@ def _given(qualifications: Iterable[Qualification]) -> list[str]:
     given = [each.given for each in found if each.kind != "assumption"]
     # Too slow for each cell.
     assumed = [each.given for each in found if each.kind == "assumption"]
-    return given + [f"{' and '.join(assumed)} (assessed for the best case only)"] * bool(assumed)
+    return given + [f"{' and '.join(assumed)} (assessed for the first cases only)"] * bool(assumed)
 
 
 def lost(sweep: Sweep, task: CellTask) -> CellResult:

@@ -30,7 +30,7 @@ PROBES = {"x": ["right", "left"], "y": ["back", "front"], "z": ["down"]}
 IN_PLANE = {"x": "yz", "y": "zx", "z": "xy"}
 
 
-@pytest.mark.parametrize(("hours", "count"), [("1", 6), ("5.7", 6), ("5.8", 9), ("8", 12)])
+@pytest.mark.parametrize(("hours", "count"), [("1", 6), ("5.7", 6), ("6", 9), ("8", 12)])
 def test_the_hours_decide_how_many_positions_a_file_begins_with(
     hours: str, count: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

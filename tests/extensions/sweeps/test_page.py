@@ -87,10 +87,11 @@ def test_figures_of_the_page_are_the_store_s(plate_sizes: Path, plate_sizes_page
         for symbol in ("U1", "U4", "U5", "U6"):
             shown = [row[heads.index(f"{symbol} {statistic}, µm")] for row in rows]
             assert shown == [number(1e6 * one) for one in frame[f"{symbol}_{statistic}_m"]]
-    # One chart along each axis, a dot for each case.
-    assert len(found.of("figure")) == 2 and text.count("dots noted") == 24
+    # One chart against hours, one along each axis, a dot for each case.
+    drawings = [one for one in found.of("figure") if "class" in one]
+    assert len(found.of("figure")) == 3 + len(drawings) and text.count("dots noted") == 36
     best = [row[:3] for row in cells_of(text, "best")[1:]]
-    assert best[0] == ["9", "750 mm", "4"] and len(best) == 8
+    assert best[0] == ['<a href="#case-9">9</a>', "750 mm", "4"] and len(best) == 8
 
 
 def test_variants_with_deficient_designs(tmp_path: Path) -> None:

@@ -99,21 +99,22 @@ def test_a_store_of_an_earlier_format_is_read_but_not_continued(
     assert store.read_bytes() == before
 
 
-def test_assumptions_are_assessed_for_the_best_case(tmp_path: Path) -> None:
+def test_assumptions_are_assessed_for_the_cases_that_the_answer_names(tmp_path: Path) -> None:
     path, store = small_sweep(tmp_path, 2, "record: [U6]\n"), tmp_path / "small.sqlite"
     text = (tmp_path / "quickstart.yaml").read_text(encoding="utf-8")
     assumed = "assumptions: {temperature: 5 K}\n"
     (tmp_path / "quickstart.yaml").write_text(text + assumed, encoding="utf-8")
     assert sweep(path) == 1
     table = rows(store)
-    best = answer(bp.stored(store)).case
-    given = [
-        one.given
-        for one in predict(experiment_of(load_sweep(path), best)).qualifications
-        if one.kind == "assumption"
-    ]
-    assert given
-    expected = {best: f"{' and '.join(given)} (assessed for the best case only)"}
+    expected = {}
+    for case in answer(bp.stored(store)).outstanding:
+        given = [
+            one.given
+            for one in predict(experiment_of(load_sweep(path), case)).qualifications
+            if one.kind == "assumption"
+        ]
+        assert given
+        expected[case] = f"{' and '.join(given)} (assessed for the first cases only)"
     done = table["status"] == "done"
     others = done.map({True: "exact probe offsets", False: ""})
     assert table["given"].tolist() == [expected.get(k, text) for k, text in enumerate(others)]

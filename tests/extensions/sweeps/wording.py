@@ -12,7 +12,7 @@ HAS_THE_VARIANTS_FEW = (
 )
 IS_NOT_RECORDED = "U6 is not recorded"
 ITS_FOLDER_CANNOT_BE_WRITTEN = "its folder cannot be written; name another with --store"
-MADE_IN_THE_STUDIO = "made in the studio"
+MADE_IN_THE_STUDIO = "in Python or the studio"
 OF_CELLS_DONE = "0 of 4 cases done"
 NO_MORE_THAN_THIRTY = "ValueError: no more than thirty"
 NO_TARGET_TO_BE_COMPARED = "no target to be compared with"
