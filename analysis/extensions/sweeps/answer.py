@@ -61,13 +61,15 @@ def answer(result: SweepCases) -> SweepAnswer | None:
         wanted.append(("Nearest to the target", judged, -share))
     else:
         order = best_first(~known, value)
-    outstanding: dict[int, str] = {}
+    found: dict[int, str] = {}
     for words, mask, figure in wanted:
         alike = mask & (comparable(figure) == comparable(figure)[mask].min(initial=np.inf))
         if rows := done[order[alike[order]]].tolist():
             one_of = f" (one of {len(rows)})" if rows[1:] else ""
-            of_case = outstanding.get(rows[0]) or f"{described(result, rows[:1])[0]}."
-            outstanding[rows[0]] = f"{words}{one_of}: {of_case}"
+            before = f"{found[rows[0]]}; " if rows[0] in found else ""
+            found[rows[0]] = f"{before}{words}{one_of}"
+    lines = described(result, found)
+    outstanding = {row: f"{found[row]}: {line}." for row, line in zip(found, lines, strict=True)}
     sentences = [*_verdict(result, meets, judged), *outstanding.values()]
     if not known.any():
         sentences.append(f"Every case leaves some of {quantity(column)} undetermined.")
