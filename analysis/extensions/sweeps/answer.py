@@ -18,6 +18,7 @@ from .cases import SweepCases, described
 LISTED = 8
 
 WITHIN = "U6_within_target"
+NO_U6 = "U6 is not recorded, so that no case is compared with a target uncertainty."
 NO_TARGET = "No case has a target uncertainty for its lengths."
 
 # Quantities to judge cases by: the average of the first that is recorded.
@@ -76,7 +77,8 @@ def answer(result: SweepCases) -> SweepAnswer | None:
     sentences += [f"Given {text}." for text in _with_cases(result, "given")]
     sentences += _sentences_on_others(result, done)
     best = tuple(done[order[:LISTED]].tolist())
-    case, is_good = int(result.table["cell"][best[0]]), bool(meets.any() or not judged.any())
+    is_good = bool(meets.any() or not judged.any())
+    case = int(result.table["cell"][best[0]])
     return SweepAnswer(tuple(sentences), best, case, is_good, outstanding)
 
 
@@ -89,8 +91,7 @@ def _verdict(result: SweepCases, meets: Flags, judged: Flags) -> list[str]:
     elif count:
         verdict = f"None of the {count} cases meets" if count > 1 else "The only case does not meet"
     else:
-        is_recorded = "U6" in result.definition["record"]
-        return [NO_TARGET if is_recorded else f"U6 is not recorded. {NO_TARGET}"]
+        return [NO_TARGET if "U6" in result.definition["record"] else NO_U6]
     more = f"{_cases(apart)} more {_verb(apart, 'have')} no target to be compared with."
     return [f"{verdict} the target uncertainty with all lengths.", *[more] * (apart > 0)]
 

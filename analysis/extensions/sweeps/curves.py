@@ -12,8 +12,8 @@ from ballplate.simulator.machines import Array
 from ballplate.uncertainty import DESCRIPTIONS
 
 from .answer import WITHIN, quantity
+from .axis_effects import averages_along
 from .cases import SweepCases, column_unit, described
-from .effects import averages_along
 
 # Styles of dots, and their words.
 STYLES = {"s0": "meets the target", "s1": "does not meet the target", "s2": "no target"}

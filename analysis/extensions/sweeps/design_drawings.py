@@ -24,6 +24,6 @@ def drawn(text: str, *captions: Html) -> Html:
     lower, upper = np.array(stated["volume"], float).T
     positions = [(name, np.array(balls, float)) for name, balls in stated["positions"]]
     words = number_of(len(positions), "position")
-    names = (f"{k + 1}: {name}" for k, (name, _) in enumerate(positions))
+    names = (f"{k}: {name}" for k, (name, _) in enumerate(positions, 1))
     caption = joined([*captions, folded(words, ", ".join(names))])
     return still_figure(plates_view(lower, upper, positions, f"{words} in the volume", caption))

@@ -22,10 +22,10 @@ from ballplate.extensions.pages.interface import (
 )
 
 from .answer import answer, criterion
+from .axis_effects import effects, frontier
 from .cases import IN_TEXT, MOST_ROWS, SHOWN, SweepCases, described, texts_of
 from .curves import charts
 from .design_drawings import drawings, drawn
-from .effects import effects, frontier
 from .temporary import TEMPORARY
 
 # Values of an axis in the list of facts.

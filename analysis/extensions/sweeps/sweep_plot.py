@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 from ballplate.presentation import MARKERS, MUTED, SERIES, common_legend, drawing, save
 
 from .answer import criterion
+from .axis_effects import frontier
 from .cases import SweepCases
 from .curves import STYLES, charts
-from .effects import frontier
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

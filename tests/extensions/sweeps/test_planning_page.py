@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.extensions.sweeps.answer import answer
-from ballplate.extensions.sweeps.effects import effects, frontier
+from ballplate.extensions.sweeps.axis_effects import effects, frontier
 from ballplate.extensions.sweeps.result import SweepResult
 
 from tests.extensions.sweeps.stores import Page, axis, done, failed, made_up_result
