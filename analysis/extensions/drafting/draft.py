@@ -86,8 +86,8 @@ def rule(sheet: DataSheet, count: int) -> str:
         return ""
     nearness = table("nearness")[count]
     return (
-        f"\n# {count} positions of a simple strategy, as {sheet.hours:g} h allow: on machines of many"
-        f" shapes, U6 was {nearness} times\n# that of a plan of as many positions."
+        f"\n# {count} positions of a simple strategy, as {sheet.hours:g} h allow; on machines of"
+        f" many shapes, U6 was {nearness} times\n# that of a plan of as many positions."
     )
 
 
