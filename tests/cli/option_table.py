@@ -56,6 +56,7 @@ TABLE: tuple[tuple[str, str, str], ...] = (
     ("run plate.yaml --trials 2 --workers 1", "--seed 5", "seed 5"),
     ("run plate.yaml", "--assumptions", "influences:"),
     ("run plate.yaml", "--report out.html", "<html"),
+    ("run plate.yaml", "--table out.csv", "U6,average,m,"),
     ("run plate.yaml", "--errors", "U6 without, µm"),
     ("run plate.yaml", "--budget", "calibration[0]: distances of plate"),
     ("run plate.yaml", "--reliability", "minimal detectable bias"),
