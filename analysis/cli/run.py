@@ -26,7 +26,6 @@ from .outputs import XLSX, UsageError, add_force, add_output, write
 
 if TYPE_CHECKING:
     from ballplate.montecarlo.experiments import Trials
-    from ballplate.results.prediction import Prediction
     from ballplate.simulator.computing.steps import ProgressStep
     from ballplate.simulator.experiment.model import Experiment
 
@@ -112,7 +111,9 @@ def run(options: Namespace) -> int:
     for experiment, plan in zip(chosen, plans, strict=True):
         heading = ["", plan.heading] if is_joint else [""]
         if options.report:
-            _write_page(options, plan)
+            with progress(options) as shown:
+                text = function("page")(plan, report=shown.show)
+            write(options, {options.report: text})
         if not options.json:
             if not is_joint:
                 print_lines([*([""] if results else []), *plan.lines()])
@@ -140,12 +141,6 @@ def run(options: Namespace) -> int:
     if interrupted:
         return int(options.interruption.status)
     return 0 if all(p.verdict.as_expected for p in plans) else 1
-
-
-def _write_page(options: Namespace, prediction: Prediction) -> None:
-    with progress(options) as shown:
-        text = function("page")(prediction, report=shown.show)
-    write(options, {options.report: text})
 
 
 def _trials(experiment: Experiment, options: Namespace) -> Trials:
