@@ -84,7 +84,7 @@ def rule(sheet: DataSheet, count: int) -> str:
     """Return why a draft has so many positions, as lines of a comment; empty without a choice."""
     if len(table("starts")[sheet.tips_there.form][sheet.tips_there.pointing]) == 1:
         return ""
-    nearness = table("nearness")[count]
+    nearness = table("nearness")[str(count)]
     return (
         f"\n# {count} positions of a simple strategy, as {sheet.hours:g} h allow; on machines of"
         f" many shapes, U6 was {nearness} times\n# that of a plan of as many positions."
