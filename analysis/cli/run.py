@@ -26,7 +26,6 @@ from .outputs import XLSX, UsageError, add_force, add_output, write
 
 if TYPE_CHECKING:
     from ballplate.montecarlo.experiments import Trials
-    from ballplate.results.prediction import Prediction
     from ballplate.simulator.computing.steps import ProgressStep
     from ballplate.simulator.experiment.model import Experiment
 
@@ -86,7 +85,6 @@ def _trial_count(text: str) -> int:
 def run(options: Namespace) -> int:
     """Plan all experiments of the files; 1 if the rank of one is not as expected."""
     from ballplate.results.prediction import predict
-    from ballplate.simulator.computing.steps import counted
 
     results: list[Data] = []
     interrupted = False
@@ -102,8 +100,7 @@ def run(options: Namespace) -> int:
     if options.report and len(chosen) > 1:
         names = ", ".join(str(experiment.name or experiment.label) for experiment in chosen)
         raise UsageError(f"--report is the page of one design; choose one with --variant: {names}")
-    with progress(options) as shown:
-        plans = [*map(predict, counted(chosen, "designs", len(chosen), shown.show))]
+    plans = list(map(predict, chosen))
     if options.table:
         write(options, {options.table: joint(tuple(plans)).write_to})
     is_joint = joint is not None and len(plans) > 1
@@ -112,7 +109,9 @@ def run(options: Namespace) -> int:
     for experiment, plan in zip(chosen, plans, strict=True):
         heading = ["", plan.heading] if is_joint else [""]
         if options.report:
-            _write_page(options, plan)
+            with progress(options) as shown:
+                text = function("page")(plan, report=shown.show)
+            write(options, {options.report: text})
         if not options.json:
             if not is_joint:
                 print_lines([*([""] if results else []), *plan.lines()])
@@ -140,12 +139,6 @@ def run(options: Namespace) -> int:
     if interrupted:
         return int(options.interruption.status)
     return 0 if all(p.verdict.as_expected for p in plans) else 1
-
-
-def _write_page(options: Namespace, prediction: Prediction) -> None:
-    with progress(options) as shown:
-        text = function("page")(prediction, report=shown.show)
-    write(options, {options.report: text})
 
 
 def _trials(experiment: Experiment, options: Namespace) -> Trials:

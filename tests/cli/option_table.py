@@ -50,7 +50,7 @@ TABLE: tuple[tuple[str, str, str], ...] = (
     ("check plate.yaml", "--goal 'U6 average 0.1 um'", "status 1"),
     ("check plate.yaml --goal lengths", "--share 50%", "50 % of lengths (U6)"),
     ("check certified/weak.yaml", "--fail-weak", "status 1"),
-    ("run pair.yaml", "--variant coarse", "without: pair[plain]"),
+    ("run pair.yaml", "--variant coarse", "pair[coarse]"),
     ("run plate.yaml", "--trials 4", "Monte Carlo: 4 data sets"),
     ("run plate.yaml --trials 1000 --workers 1", "--until 30%", "without: 1000 data sets"),
     ("run plate.yaml --trials 2 --workers 1", "--seed 5", "seed 5"),

@@ -12,7 +12,7 @@ from typing import Any
 
 from ballplate.presentation import Data, MainTable, Result, percent, table_lines
 from ballplate.results import Prediction, map_lines, scale_lines, verdict_lines
-from ballplate.simulator.inputs import cell_of_text, in_one_line
+from ballplate.simulator.inputs import cell_of_text, in_one_line, number_of
 
 HEADINGS = ("symbol", "value", "unit")
 # Letters of all names together, beyond which numbers replace them.
@@ -47,7 +47,7 @@ class JointTable(Result):
         return [str(k) for k, _ in enumerate(names, start=1)]
 
     def headline(self) -> str:
-        return f"{len(self.names)} designs"
+        return number_of(len(self.names), "design")
 
     def data(self) -> Data:
         return {"designs": [p.data() for p in self.predictions]}
@@ -62,7 +62,7 @@ class JointTable(Result):
         return {name: itemgetter(name) for name in names} | {"unit": "unit"}, items
 
     def lines(self) -> list[str]:
-        return [*table_lines(*self.columns()), ""]
+        return [self.heading, "", *table_lines(*self.columns()), ""]
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -109,17 +109,17 @@ def joint_table(*predictions: Prediction) -> JointTable:
     """Return one table of predictions with a column for each, as `run` of several designs prints.
 
     >>> import ballplate as bp
-    >>> table = bp.joint_table(*map(bp.run, bp.load_all("designs/npl/5.2.yaml")))
-    >>> list(table.to_frame().columns)
+    >>> predictions = map(bp.run, bp.load_all("designs/npl/5.2.yaml"))
+    >>> list(bp.joint_table(*predictions).to_frame())
     ['symbol', 'value', 'unit', 'kinematic fit', 'empirical fit']
     """
     return JointTable(predictions)
 
 
-def _values(p: Prediction) -> dict[tuple[str, ...], Any]:
+def _values(p: Prediction) -> dict[Any, Any]:
     """Return the values of a design by symbol, kind of value and unit."""
-    values: dict[tuple[str, ...], Any] = {("", "rank deficiency", ""): p.verdict.deficiency}
-    values["", "as expected", ""] = p.verdict.as_expected
+    values: Any = {("", "rank deficiency", ""): p.verdict.deficiency}
+    values["", "rank as expected", ""] = p.verdict.as_expected
     for symbol, q in p.quantities.items():
         # Lengths and angles together have neither maximum nor average.
         if ", " not in q.unit:

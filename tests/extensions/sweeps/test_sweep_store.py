@@ -277,16 +277,19 @@ def test_export(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = small_sweep(tmp_path, 2)
     sweep(path)
     store, table = tmp_path / "small.sqlite", rows(tmp_path / "small.sqlite")
-    for name in ("t.csv", "t.parquet"):
+    for name in ("t.csv", "t.parquet", "t.xlsx"):
         assert main(["sweep", "--export", str(store), "-o", str(tmp_path / name)]) == 0
     # Not with pandas, some versions of which do not read every number to the last bit.
     with (tmp_path / "t.csv").open(encoding="utf-8", newline="") as stream:
         written = list(csv.DictReader(stream))
     parquet = pandas.read_parquet(tmp_path / "t.parquet")
+    workbook = pandas.read_excel(tmp_path / "t.xlsx")
+    assert list(workbook) == list(written[0]) and len(workbook) == len(written)
     for name in table.select_dtypes("float"):
+        np.testing.assert_allclose(workbook[name], table[name], rtol=1e-14)
         np.testing.assert_array_equal([float(row[name] or "nan") for row in written], table[name])
         np.testing.assert_array_equal(parquet[name], table[name])
-    assert main(["sweep", "--export", str(store), "-o", str(tmp_path / "t.xlsx")]) == 2
+    assert main(["sweep", "--export", str(store), "-o", str(tmp_path / "t.ods")]) == 2
     assert main(["sweep", "--export", str(store), "-o", str(tmp_path / "no" / "t.csv")]) == 3
     assert main(["sweep", "--export", str(store), "--sweep", "5", "-o", "-"]) == 3
     assert main(["sweep", "--export", str(tmp_path / "none.sqlite"), "-o", "-"]) == 3
