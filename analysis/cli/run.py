@@ -85,7 +85,6 @@ def _trial_count(text: str) -> int:
 def run(options: Namespace) -> int:
     """Plan all experiments of the files; 1 if the rank of one is not as expected."""
     from ballplate.results.prediction import predict
-    from ballplate.simulator.computing.steps import counted
 
     results: list[Data] = []
     interrupted = False
@@ -101,8 +100,7 @@ def run(options: Namespace) -> int:
     if options.report and len(chosen) > 1:
         names = ", ".join(str(experiment.name or experiment.label) for experiment in chosen)
         raise UsageError(f"--report is the page of one design; choose one with --variant: {names}")
-    with progress(options) as shown:
-        plans = [*map(predict, counted(chosen, "designs", len(chosen), shown.show))]
+    plans = list(map(predict, chosen))
     if options.table:
         write(options, {options.table: joint(tuple(plans)).write_to})
     is_joint = joint is not None and len(plans) > 1

@@ -109,8 +109,8 @@ def joint_table(*predictions: Prediction) -> JointTable:
     """Return one table of predictions with a column for each, as `run` of several designs prints.
 
     >>> import ballplate as bp
-    >>> table = bp.joint_table(*map(bp.run, bp.load_all("designs/npl/5.2.yaml")))
-    >>> list(table.to_frame().columns)
+    >>> predictions = map(bp.run, bp.load_all("designs/npl/5.2.yaml"))
+    >>> list(bp.joint_table(*predictions).to_frame())
     ['symbol', 'value', 'unit', 'kinematic fit', 'empirical fit']
     """
     return JointTable(predictions)

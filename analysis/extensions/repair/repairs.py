@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ballplate.presentation import Data, finite, number, picked
+from ballplate.presentation import Data, finite, given, number, picked
 from ballplate.rank import Verdict, length
 from ballplate.results import Prediction, given_words, qualification_data
 from ballplate.uncertainty import OFFSET_TRIAL, exact_offsets
@@ -147,4 +147,4 @@ class Repairs:
         """Return repairs as plain data in metres at full precision, if any are needed."""
         is_needed = bool(self.repairs or self.reason)
         found = [each.to_dict() for each in self.repairs] if is_needed else None
-        return {"repairs": found, "strategy": self.strategy}
+        return {"repairs": found, **given(strategy=self.strategy)}
