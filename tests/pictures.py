@@ -46,7 +46,7 @@ def _pages(folder: Path) -> dict[str, Path]:
     experiment = bp.load("designs/quickstart.yaml")
     fit = bp.fit(experiment, bp.simulate(experiment, seed=1))
     store = folder / "plates.sqlite"
-    bp.sweep("designs/sweeps/plate-size.yaml", store)
+    bp.sweep("designs/sweeps/plate-size.yaml", store=store)
     texts = {
         "design-page": page_of_design(experiment, bp.run(experiment)),
         "fit-page": fit.page(),

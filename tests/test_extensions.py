@@ -48,6 +48,7 @@ BUILDS_ON = {
     ("studio", "maps"): "the studio shows the map of lengths in the volume",
     ("studio", "pages"): "the studio moves designs as pages do",
     ("sweeps", "pages"): "the page of a sweep is a page",
+    ("sweeps", "planning"): "cases choose their positions as plans do, and cost hours",
     ("studio", "repair"): "the studio writes changes into the file as repairs are written",
     ("studio", "sweeps"): "the studio computes sweeps and shows their page",
 }

@@ -202,7 +202,7 @@ WRONG: list[tuple[Callable[[], object], type[Exception], str]] = [
     (lambda: bp.run(QUICKSTART, until=float("nan")), ValueError, "until=nan; give a ratio above 0"),
     (lambda: bp.reach(QUICKSTART, unknowns="rows"), ValueError, "known: repeatability"),
     (lambda: bp.budget(QUICKSTART, by=None), ValueError, 'by: "None" is unknown; known: axis'),
-    (lambda: bp.sweep(3), TypeError, "path=3; give the path of a file"),
+    (lambda: bp.sweep(3), TypeError, "experiment=3; give the path of a file"),
     (lambda: bp.run(QUICKSTART, seed=5), ValueError, "apply to trials or until only"),
     (lambda: bp.run(QUICKSTART, workers=3), ValueError, "apply to trials or until only"),
     (lambda: bp.check(QUICKSTART, goals=5), TypeError, "goals=5; give texts such as"),
@@ -250,7 +250,9 @@ def test_every_function_reports_steps_alike(tmp_path: Path) -> None:
         lambda report: bp.reliability(QUICKSTART, report=report),
         lambda report: bp.reach(QUICKSTART, "U6 average 0.2 um", "repeatability", report=report),
         lambda report: bp.compare(QUICKSTART, trials=2, points=5, report=report),
-        lambda report: bp.sweep(small_sweep(tmp_path, 2), tmp_path / "a.sqlite", report=report),
+        lambda report: bp.sweep(
+            small_sweep(tmp_path, 2), store=tmp_path / "a.sqlite", report=report
+        ),
     ):
         told: list[ProgressStep] = []
         call(told.append)

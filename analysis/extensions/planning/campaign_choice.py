@@ -138,6 +138,7 @@ def campaign(
 
 
 # In one piece: the steps of a campaign in their order, and one result of all of them.
+@single_threaded
 def _campaign(
     experiment: Experiment,
     pool: Pool,

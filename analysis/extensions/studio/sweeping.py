@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 import re
 import tempfile
 from collections.abc import Mapping, Sequence
@@ -11,14 +10,13 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from ballplate.extensions.repair.yamltext import flow
-from ballplate.extensions.sweeps.bundle import Bundle, names_of, unpack
 from ballplate.extensions.sweeps.load import load_sweep
 from ballplate.extensions.sweeps.running import computed
+from ballplate.extensions.sweeps.temporary import written_sweep
 from ballplate.presentation import finite
 from ballplate.simulator.computing import Report
-from ballplate.simulator.experiment import named_in, node_at, node_of
-from ballplate.simulator.inputs import ExperimentError, Mark, Scalar
+from ballplate.simulator.experiment import node_at
+from ballplate.simulator.inputs import ExperimentError, Scalar
 
 from .actions import ActionError, value_of
 from .document import DesignDocument, encoded, experiment_of
@@ -120,33 +118,17 @@ def _written(document: DesignDocument, axes: Axes, folder: Path) -> Path:
     """Write the sweep's file in a folder, with the present design and copies of the files that it
     names.
     """
-    experiment, mark = experiment_of(document), Mark("sweep", 0, 0)
-    named = [
-        (path, node_of(value_of(value), mark))
-        for paths, values in axes.items()
-        for path, value in product(paths, values)
-    ]
-    source = Path(os.path.abspath(document.path))
-    try:
-        names = names_of(
-            sorted({source, *named_in([("", experiment.tree), *named], source.parent)})
-        )
-        contents = ((name, path) for path, name in names.items() if path != source)
-        files = tuple((name, Path(path).read_bytes()) for name, path in contents)
-    except (OSError, ValueError) as error:
-        raise ActionError(f"the files that the design names cannot be copied: {error}") from None
-    name = names[source]
-    design = unpack(Bundle(name, name, (*files, (name, encoded(document)))), folder)
+    experiment = experiment_of(document)
     variant = {} if document.variant is None else {"variant": document.variant}
-    sweep = {
+    content = {
         "title": experiment.title,
-        "base": design.name,
         **variant,
         "axes": {
             " ".join(paths): {"paths": list(paths), "values": [*map(value_of, values)]}
             for paths, values in axes.items()
         },
     }
-    file = design.with_name(".ballplate-sweep.yaml")
-    file.write_text(f"{flow(sweep)}\n", encoding="utf-8")
-    return file
+    try:
+        return written_sweep(encoded(document), experiment, document.path, content, folder)
+    except (OSError, ValueError) as error:
+        raise ActionError(f"the files that the design names cannot be copied: {error}") from None

@@ -60,7 +60,7 @@ class SweepCases:
     """
 
     label: str
-    store: Path
+    store: Path | None
     number: int
     definition: dict[str, Any]
     summary: Summary

@@ -36,7 +36,7 @@ def _bound(value: object, axis: SweepAxis, otherwise: float) -> float:
     if not axis.unit:
         raise ValueError("the values of the axis are not numbers; name those that are meant")
     if unit != axis.unit:
-        example = {"m": "300 mm", "rad": "2 arcsec", "1": "5"}[axis.unit]
+        example = {"m": "300 mm", "rad": "2 arcsec", "1": "5", "h": "3 h"}[axis.unit]
         raise ValueError(
             f'"{value}" cannot be compared with the values of the axis; write for example'
             f' "{example}"'

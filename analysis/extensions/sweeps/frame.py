@@ -22,7 +22,8 @@ def frame_of(results: StoredResults, defined: dict[str, Any]) -> pandas.DataFram
 
     Columns: `cell` from 0, one for each axis (in metres or radians, with the unit in its name, or
     texts), `status`, `reason`, what figures take for granted (`given`), `unspanned` if a size
-    leaves a part of the volume out, the results by name (NaN if a cell lacks one), `data_set_seed`,
+    leaves a part of the volume out, the names of the `chosen` candidates of plans, the content of a
+    `drawing` as JSON, the results by name (NaN if a cell lacks one), `data_set_seed`,
     `fingerprint`, `duration_s`, and the versions.
     """
     import pandas
@@ -37,8 +38,10 @@ def frame_of(results: StoredResults, defined: dict[str, Any]) -> pandas.DataFram
         columns[axis["column"]] = values[chosen[:, k]]
     columns |= {name: [getattr(row, name) for row in results.rows] for name in ("status", "reason")}
     columns["given"] = ["; ".join(row.details.get("given", ())) for row in results.rows]
-    lost = [row.details.get("unspanned", "") for row in results.rows]
-    columns |= {"unspanned": lost} if any(lost) else {}
+    for name in ("unspanned", "chosen", "drawing"):
+        details = [row.details.get(name, "") for row in results.rows]
+        texts = ["; ".join(text) if isinstance(text, list) else text for text in details]
+        columns |= {name: texts} if any(texts) else {}
     columns |= results.figures
     columns |= {
         "data_set_seed": np.array([row.seed for row in results.rows], np.int64),

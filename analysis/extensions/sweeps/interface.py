@@ -7,56 +7,86 @@ Every function raises `ballplate.StoreError` for a store that it cannot use, oth
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from ballplate.arguments import PathLike, experiment_of
 from ballplate.simulator.computing import Report, unreported
+from ballplate.simulator.experiment import Experiment
 from ballplate.simulator.inputs import ensure_path, ensure_report, ensure_type, ensure_whole
 
 if TYPE_CHECKING:
     from .result import SweepResult
 
-PathLike = str | os.PathLike[str]
-
 
 def sweep(
-    path: PathLike,
+    experiment: Experiment | PathLike,
+    axes: Mapping[str | tuple[str, ...], Any] | None = None,
     store: PathLike | None = None,
     workers: int = 1,
+    criterion: str | None = None,
+    trials: int | None = None,
+    seed: int | None = None,
+    record: Sequence[str] = (),
     retry_failed: bool = False,
     beside: bool = False,
     fail_fast: bool = False,
     folders: Sequence[PathLike] = (),
     report: Report = unreported,
 ) -> SweepResult:
-    """Compute a family of experiments into a store, or continue an interrupted sweep.
+    """Compute a family of experiments: an experiment over axes, or the path of a sweep file.
 
-    The default store is the sweep file's name with .sqlite. A store that holds another sweep is
-    refused, unless `beside` adds this one. The sweep may name files in its own folder, that of its
-    base, and `folders`; `fail_fast` stops it when a cell fails.
+    `axes` maps paths of the experiment to values, as a list or by name; several paths take the same
+    values, or one of each row. `hours`, `positions` and `readings` with numbers are limits of plans
+    from the experiment's pool, which minimise the `criterion`, by default U6: then each case
+    chooses its positions as `ballplate.plan` does. `trials` are synthetic data sets of each case,
+    from the `seed`; `record` names the quantities that are kept, by default U1 to U6.
+
+    Without a `store` axes are computed in memory; the results of a sweep file are stored in its
+    name with .sqlite. An interrupted sweep continues from its store. A store that holds another
+    sweep is refused, unless `beside` adds this one. A sweep file may name files in its own folder,
+    that of its base, and `folders`; `fail_fast` stops when a case fails.
 
     :raises StoreError: the store cannot be used.
     :raises OtherSweepError: it holds another sweep.
 
-    >>> import tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     path = f"{folder}/plates.sqlite"
-    ...     computed = sweep("designs/sweeps/plate-size.yaml", path)
-    ...     computed, stored(path).to_frame().equals(computed.to_frame())
-    (<SweepResult of plate-size: 12 cases, 12 done, 0 failed>, True)
+    >>> import ballplate as bp
+    >>> found = bp.sweep(bp.quickstart(), {"machine.repeatability": ["0.2 um", "0.4 um"]})
+    >>> found, found.to_frame()["hours"].round(2).tolist()
+    (<SweepResult of quickstart: 2 cases, 2 done, 0 failed>, [5.18, 5.18])
     """
+    from dataclasses import replace
+    from tempfile import TemporaryDirectory
+
     from .load import load_sweep
     from .running import computed
+    from .temporary import sweep_of
 
-    ensure_path("path", path)
-    ensure_whole(1, workers=workers)
+    ensure_whole(1, workers=workers, trials=trials)
+    ensure_whole(0, seed=seed)
     ensure_type(bool, "True or False", retry_failed=retry_failed, beside=beside)
     ensure_type(bool, "True or False", fail_fast=fail_fast)
     ensure_report(report)
-    loaded = load_sweep(path, folders=tuple(Path(os.path.abspath(folder)) for folder in folders))
-    into = Path(path).with_suffix(".sqlite") if store is None else Path(store)
-    return computed(loaded, into, workers, retry_failed, beside, fail_fast, report)
+    ways = (workers, retry_failed, beside, fail_fast, report)
+    if axes is None:
+        ensure_path("experiment", experiment)
+        assert not isinstance(experiment, Experiment)
+        within = tuple(Path(os.path.abspath(folder)) for folder in folders)
+        loaded = load_sweep(experiment, folders=within)
+        into = Path(experiment).with_suffix(".sqlite") if store is None else Path(store)
+        return computed(loaded, into, *ways)
+    ensure_type(Mapping, "a mapping of paths to values", axes=axes)
+    chosen = experiment_of(experiment)
+    content: dict[str, Any] = {"trials": trials, "seed": seed, "record": list(record)}
+    content = {key: value for key, value in content.items() if value not in (None, [])}
+    content |= {"plan": {"criterion": criterion}} if criterion is not None else {}
+    with TemporaryDirectory() as folder:
+        file = sweep_of(chosen, axes, content, Path(folder))
+        loaded = load_sweep(file, trust=chosen.trust)
+        into = file.with_suffix(".sqlite") if store is None else Path(store)
+        found = computed(loaded, into, *ways)
+    return replace(found, label=chosen.label, store=None if store is None else into)
 
 
 def stored(store: PathLike, sweep: int | None = None) -> SweepResult:

@@ -40,6 +40,7 @@ from ballplate.simulator.inputs import (
 from .axes import read_axis
 from .bundle import bundle_of, code_digest
 from .conditions import holds
+from .limits import read_limits
 from .model import Sweep, SweepAxis, Trees
 from .store_columns import is_reserved
 from .sweep_settings import SweepSettings
@@ -77,7 +78,8 @@ def load_sweep(
         problems.take(error, ("base",))
         raise ExperimentError(sorted(problems.messages)) from None
     _check_variant(settings, trees, problems)
-    axes = _axes(settings, root, trees, problems)
+    planning, limits = read_limits(settings.plan, root, problems)
+    axes = _axes(settings, limits, root, trees, problems)
     cells = tuple(_selected_cells(settings, axes))
     if not cells:
         problems.add(
@@ -97,6 +99,7 @@ def load_sweep(
         settings.record,
         folders=folders,
         trust=trust,
+        planning=planning,
     )
     _check_base(sweep)
     bundle = bundle_of(sweep)
@@ -105,12 +108,20 @@ def load_sweep(
     return replace(sweep, digest=bundle.digest, code=code)
 
 
-def _axes(settings: SweepSettings, root: Node, trees: Trees, problems: Problems) -> list[SweepAxis]:
+def _axes(
+    settings: SweepSettings,
+    limits: list[SweepAxis],
+    root: Node,
+    trees: Trees,
+    problems: Problems,
+) -> list[SweepAxis]:
     read_axes = [
         read_axis(name, axis_settings, root, trees, settings.variant, problems)
         for name, axis_settings in settings.axes.items()
     ]
-    axes = [axis for axis in read_axes if axis is not None]
+    axes = [*(axis for axis in read_axes if axis is not None), *limits]
+    if not settings.axes and not limits and not problems.messages:
+        problems.add((), "nothing varies; give axes, or several values of a limit in plan")
     if not problems.messages:
         _check_apart(axes, next(iter(trees.values())), problems)
     _check_names(axes, problems)
@@ -149,7 +160,8 @@ def experiment_of(sweep: Sweep, number: int) -> Experiment:
                 tree = override(tree, path, node, mark)
             except ValueError as error:
                 raise mark.refused(str(error), path) from None
-    experiment, messages = build(tree, sweep.base, sweep.label(number), sweep.trust)
+    planning = sweep.planning is not None
+    experiment, messages = build(tree, sweep.base, sweep.label(number), sweep.trust, planning)
     if experiment is None:
         raise ExperimentError(sorted(messages))
     return experiment
@@ -262,8 +274,8 @@ def _check_conditions(settings: SweepSettings, axes: list[SweepAxis], problems: 
     for key, entries in (("skip", settings.skip), ("only", settings.only)):
         for k, entry in enumerate(entries):
             for name, condition in entry.items():
-                if name not in settings.axes:
-                    text = f'there is no axis "{name}"; {hint(name, settings.axes)}'
+                if name not in (*settings.axes, *by_name):
+                    text = f'there is no axis "{name}"; {hint(name, [*settings.axes, *by_name])}'
                     problems.add((key, k, name), text, of_key=True)
                 elif name in by_name:
                     axis = by_name[name]
@@ -310,7 +322,9 @@ def _check_base(sweep: Sweep) -> None:
     except ExperimentError:
         messages = set()
         for name, tree in sweep.trees.items():
-            experiment, errors = build(tree, sweep.base, name, sweep.trust)
+            experiment, errors = build(
+                tree, sweep.base, name, sweep.trust, sweep.planning is not None
+            )
             if experiment is not None:
                 return
             messages |= set(errors)

@@ -11,7 +11,20 @@ from ballplate.simulator.inputs import OPENED, Mark, Node, Trust
 # Contents of the base file and its variants, by their names.
 Trees = dict[str | None, Node]
 
-Unit = Literal["m", "rad", "1", ""]
+Unit = Literal["m", "rad", "1", "h", ""]
+
+
+# A limit of a plan, by its name in `planning.Budget`.
+Limit = tuple[Literal["seconds", "readings", "positions"], float]
+
+
+@dataclass(frozen=True)
+class Planning:
+    """How each case chooses from the pool; `limits` are those that all cases have."""
+
+    criterion: str
+    seed: int
+    limits: tuple[Limit, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,8 +32,9 @@ class Choice:
     """One value of an axis: `changes` are paths with their new nodes, or `variant` replaces the
     variant.
 
-    `kept` is the path of a list with the names of the entries to keep. `value` is a number in
-    metres, radians or without unit if the axis has such values, otherwise NaN.
+    `kept` is the path of a list with the names of the entries to keep, `limit` one of a plan.
+    `value` is a number in metres, radians, hours or without unit if the axis has such values,
+    otherwise NaN.
     """
 
     label: str
@@ -28,6 +42,7 @@ class Choice:
     value: float = float("nan")
     variant: str | None = None
     kept: tuple[str, tuple[str, ...], Mark] | None = None
+    limit: Limit | None = None
 
     @property
     def paths(self) -> tuple[str, ...]:
@@ -59,7 +74,7 @@ class Sweep:
     `cells` are indices of choices, one for each axis, in the order of the file with the last axis
     fastest. `digest` is a hash of all files of the sweep, `code` of those that an error model in
     Python may read, empty without one. Named files must be in the sweep's folder, its base's, or
-    `folders`; all have the same `trust`.
+    `folders`; all have the same `trust`. With `planning` each case chooses its positions.
     """
 
     source: Path
@@ -76,6 +91,7 @@ class Sweep:
     code: str = ""
     folders: tuple[Path, ...] = ()
     trust: Trust = OPENED
+    planning: Planning | None = None
 
     def choices(self, number: int) -> tuple[Choice, ...]:
         """Choices of a cell."""

@@ -46,7 +46,7 @@ class SweepResult(SweepCases, Result):
         return {
             "sweep": self.label,
             "title": self.title,
-            "store": str(self.store),
+            "store": None if self.store is None else str(self.store),
             **picked(self.summary, "cells", "done", "failed", "left"),
             "shortcomings": self.shortcomings,
             "rows": self.rows(),

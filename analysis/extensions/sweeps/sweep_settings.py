@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from ballplate.simulator.experiment import Line, Seed
 from ballplate.simulator.geometry import Name
-from ballplate.simulator.inputs import Forms, NonEmpty, Settings
+from ballplate.simulator.inputs import Duration, Forms, NonEmpty, Settings, Text
 from ballplate.uncertainty import QUANTITIES, RECORDED, RECORDED_IF_TOLD
 from pydantic import Field
 
@@ -87,6 +87,32 @@ class BoundsSettings(Settings):
 Condition = Forms[Scalar, NonEmpty[Any], BoundsSettings]
 
 
+Count = Annotated[int, Field(ge=1)]
+CountRange = Annotated[str, Field(pattern=r"^ *[1-9][0-9]{0,8} +to +[1-9][0-9]{0,8} *$")]
+Counts = Forms[Count | CountRange, NonEmpty[Count], NonEmpty[Count]]
+Hours = Annotated[Duration, Field(gt=0)]
+
+
+class PlanSettings(Settings):
+    """Each case chooses positions and certificates from the pool of the base, as `ballplate plan`
+    does. Several values of a limit are an axis.
+    """
+
+    criterion: Text = Field("U6", description="what the choice minimises; as --criterion of plan")
+    hours: Forms[Hours, NonEmpty[Hours], NonEmpty[Hours]] | None = Field(
+        None, description="limit of laboratory time, such as 4 h, or a list: axis `hours limit`"
+    )
+    positions: Counts | None = Field(
+        None,
+        description="largest number of positions, a list or a range: axis `positions limit`",
+    )
+    readings: Counts | None = Field(
+        None,
+        description="largest number of readings, a list or a range: axis `readings limit`",
+    )
+    seed: Seed = Field(1, description="of the random starts of each search")
+
+
 class SweepSettings(Settings):
     """A sweep file: an experiment, its axes, and the quantities to record."""
 
@@ -97,8 +123,11 @@ class SweepSettings(Settings):
     variant: Name | None = Field(
         None, description="variant of the base file; needed if it has several"
     )
-    axes: Annotated[dict[Name, AxisSettings], Field(min_length=1)] = Field(
-        description="name: what varies; every combination of the axes' values is a case"
+    axes: dict[Name, AxisSettings] = Field(
+        {}, description="name: what varies; every combination of the axes' values is a case"
+    )
+    plan: PlanSettings | None = Field(
+        None, description="choose the positions of each case from the pool of the base"
     )
     skip: tuple[Annotated[dict[Name, Condition], Field(min_length=1)], ...] = Field(
         (),

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from ballplate.extensions.planning import Request, Spent, campaign, spent_as_drawn
 from ballplate.montecarlo import (
     Accumulator,
     MonteCarloEstimate,
@@ -24,10 +25,12 @@ from ballplate.results import Prediction, Qualification, predict, qualifications
 from ballplate.simulator.computing import single_threaded, versions, want_of_memory
 from ballplate.simulator.experiment import Experiment, unspanned
 from ballplate.simulator.inputs import ExperimentError, UnusableError
+from ballplate.uncertainty import exact_offsets
 
 from .fingerprint import fingerprint
 from .load import base_tree, experiment_of
 from .model import Sweep
+from .planned import choice_figures, cost_figures, drawing, request_of
 from .store_columns import symbol_column, unit_suffix
 
 # Replicates of a block, a multiple of a batch's; a cell with more is computed in several blocks.
@@ -39,6 +42,9 @@ WITH_MEMORY = "use fewer --workers, and --retry-failed to compute it again"
 # Blocks of tasks that compute only the cell's key, or what its figures take for granted with the
 # effects of assumptions, which take longer than the figures.
 KEY_ONLY, GIVEN_ONLY = -1, -2
+
+# What a case costs, or what chooses its positions, on which its cost depends.
+Cost = Spent | Request
 
 
 @dataclass(frozen=True)
@@ -78,8 +84,12 @@ class CellResult:
 
 
 def blocks_of(sweep: Sweep) -> int:
-    """Return the number of replicate blocks with tasks of their own; 0 if one task computes all."""
-    return -(-sweep.trials // BLOCK) if sweep.trials is not None and sweep.trials > BLOCK else 0
+    """Return the number of replicate blocks with tasks of their own; 0 if one task computes all, as
+    where each would choose its positions anew.
+    """
+    if sweep.trials is None or sweep.trials <= BLOCK or sweep.planning is not None:
+        return 0
+    return -(-sweep.trials // BLOCK)
 
 
 @single_threaded
@@ -96,7 +106,9 @@ def _computed(sweep: Sweep, task: CellTask) -> CellResult:
         experiment = experiment_of(sweep, number)
     except (ExperimentError, MemoryError) as error:
         return CellResult(number, block, invalid_key(sweep, number), "failed", _reason(error))
-    key = key_of(sweep, experiment)
+    request = request_of(sweep, number)
+    cost = request or spent_as_drawn(experiment)
+    key = key_of(sweep, experiment, cost)
     seed = seed_of(sweep, key)
     if block == KEY_ONLY:
         return CellResult(number, block, key, "done")
@@ -107,7 +119,7 @@ def _computed(sweep: Sweep, task: CellTask) -> CellResult:
         if block:
             tally = block_of_trials(experiment, sweep.trials or 0, seed, block - 1, BLOCK)
             return CellResult(number, block, key, "done", seed=seed, tally=tally)
-        return _whole(sweep, experiment, task, key, seed)
+        return _whole(sweep, experiment, cost, task, key, seed)
     except Exception as error:
         # An error model in Python may raise anything; the other cells go ahead.
         return CellResult(number, block, key, "failed", _reason(error), seed)
@@ -129,15 +141,26 @@ def _reason(error: Exception) -> str:
     )
 
 
-def _whole(sweep: Sweep, experiment: Experiment, task: CellTask, key: str, seed: int) -> CellResult:
-    planned = predict(experiment)
-    figures = plan_figures(planned, sweep.record)
-    without_assumptions = qualifications_of(
-        planned.verdict.deficiency, planned.scale, None, experiment
-    )
-    details: dict[str, Any] = {"given": _given(without_assumptions)}
-    if lost := unspanned(base_tree(sweep, task.number), experiment):
-        details["unspanned"] = lost
+def _whole(
+    sweep: Sweep, experiment: Experiment, cost: Cost, task: CellTask, key: str, seed: int
+) -> CellResult:
+    details: dict[str, Any] = {}
+    if isinstance(cost, Request):
+        choice = campaign(experiment, cost)
+        experiment, planned = choice.chosen_experiment, choice.prediction
+        figures = choice_figures(choice)
+        given = [each.given for each in choice.qualifications]
+        details |= {"chosen": [candidate.name for candidate in choice.chosen], "assessed": True}
+    else:
+        planned, figures = predict(experiment), cost_figures(cost)
+        deficiency = planned.verdict.deficiency
+        given = _given(qualifications_of(deficiency, None, None, experiment))
+        # Whether the scale rests on them takes longer than the figures.
+        given += ["exact probe offsets"] * bool(exact_offsets(experiment))
+        if lost := unspanned(base_tree(sweep, task.number), experiment):
+            details["unspanned"] = lost
+    figures |= plan_figures(planned, sweep.record)
+    details |= {"given": list(dict.fromkeys(given)), "drawing": drawing(experiment)}
     if sweep.trials is not None:
         if task.total is not None:
             replicates = Trials(seed, combined(experiment, task.total))
@@ -179,10 +202,12 @@ def lost(sweep: Sweep, task: CellTask) -> CellResult:
     )
 
 
-def key_of(sweep: Sweep, experiment: Experiment) -> str:
-    """Return the key of a cell: of its experiment, the recorded quantities, and any data sets."""
+def key_of(sweep: Sweep, experiment: Experiment, cost: Cost) -> str:
+    """Return the key of a cell: of its experiment, its cost or the request for its plan, the
+    recorded quantities, and any data sets.
+    """
     trials = None if sweep.trials is None else (sweep.trials, sweep.seed)
-    return fingerprint(experiment, trials, sorted(set(sweep.record)), sweep.code)
+    return fingerprint(experiment, cost, trials, sorted(set(sweep.record)), sweep.code)
 
 
 def invalid_key(sweep: Sweep, number: int) -> str:

@@ -18,6 +18,7 @@ from ballplate.simulator.inputs import (
     child,
     exact_number,
     parse_angle,
+    parse_duration,
     parse_length,
     parse_ratio,
     shorten,
@@ -30,6 +31,7 @@ KINDS: tuple[tuple[Unit, Callable[[object], float]], ...] = (
     ("m", parse_length),
     ("rad", parse_angle),
     ("1", parse_ratio),
+    ("h", lambda value: parse_duration(value) / 3600.0),
 )
 
 
@@ -56,8 +58,10 @@ def _text(value: Any) -> str:
 def numeric(value: object) -> tuple[float, Unit]:
     """Return a number or quantity in SI units with its unit; NaN without unit for anything else.
 
-    >>> numeric("750 mm"), numeric(5), numeric("z low")[1]
-    ((0.75, 'm'), (5.0, '1'), '')
+    Durations are in hours.
+
+    >>> numeric("750 mm"), numeric(5), numeric("90 min"), numeric("z low")[1]
+    ((0.75, 'm'), (5.0, '1'), (1.5, 'h'), '')
     """
     if isinstance(value, int | float) and not isinstance(value, bool):
         # A float cannot represent every larger whole number.

@@ -128,7 +128,7 @@ def test_sweeps_note_it_in_text_table_json_and_page(
     assert all(lines.count(text) == 1 for text in told)
     # Plates that follow have neither note nor column.
     (tmp_path / "quickstart.yaml").write_text(TEXT, encoding="utf-8")
-    followed = bp.sweep(tmp_path / "s.yaml", tmp_path / "t.sqlite")
+    followed = bp.sweep(tmp_path / "s.yaml", store=tmp_path / "t.sqlite")
     assert "unspanned" not in followed.to_frame() and "span" not in str(followed)
 
 
