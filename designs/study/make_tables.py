@@ -63,7 +63,9 @@ def compact(rows: pd.DataFrame) -> pd.DataFrame:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("--workers", type=int, default=1, help="number of processes; default: 1")
-    parser.add_argument("--stores", type=Path, help="folder of the stores; default: a temporary one")
+    parser.add_argument(
+        "--stores", type=Path, help="folder of the stores; default: a temporary one"
+    )
     parser.add_argument("names", nargs="*", help="sweeps, such as recipes; default: all")
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as temporary:
