@@ -1,4 +1,4 @@
-"""Compute the sweeps of this folder again and write their tables: `tables/NAME.csv` of `NAME.yaml`.
+"""Compute the sweeps again and write their tables: `tables/NAME.csv` of `sweeps/NAME.yaml`.
 
     python designs/study/make_tables.py --workers 2
 
@@ -16,7 +16,6 @@ import ballplate as bp
 import pandas as pd
 
 HERE = Path(__file__).resolve().parent
-BASE = "machines"
 
 # Columns of a table after those of the axes, with their names there; all lengths in micrometres.
 KEPT = {
@@ -35,7 +34,7 @@ DIGITS = 6
 
 def names() -> list[str]:
     """The names of the sweeps, in alphabetical order."""
-    return sorted(path.stem for path in HERE.glob("*.yaml") if path.stem != BASE)
+    return sorted(path.stem for path in (HERE / "sweeps").glob("*.yaml"))
 
 
 def compact(rows: pd.DataFrame) -> pd.DataFrame:
@@ -72,7 +71,7 @@ def main() -> None:
         stores = arguments.stores or Path(temporary)
         for name in arguments.names or names():
             store = stores / f"{name}.sqlite"
-            swept = bp.sweep(HERE / f"{name}.yaml", store=store, workers=arguments.workers)
+            swept = bp.sweep(HERE / "sweeps" / f"{name}.yaml", store=store, workers=arguments.workers)
             table = compact(swept.to_frame())
             table.to_csv(HERE / "tables" / f"{name}.csv", index=False, lineterminator="\n")
             print(f"{name}.csv: {len(table)} rows", flush=True)

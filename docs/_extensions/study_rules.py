@@ -112,15 +112,6 @@ def hourly(first: int, last: int) -> Values:
     return 100 * (1 - (planned(last) / planned(first)) ** (1 / hours))
 
 
-def last_paying(percent: float = 5.0) -> Values:
-    """The largest number of positions that saves so many percent for each of its last hours."""
-    counts = sorted(table("positions")["positions limit"].unique())
-    paying = pd.Series(counts[0], index=list(MACHINES))
-    for first, last in zip(counts, counts[1:], strict=False):
-        paying[hourly(first, last) >= percent] = last
-    return paying
-
-
 def assumed(first: str, second: str) -> pd.Series:
     """Ratios of U6 of two recipes under all assumptions, on all machines."""
     kept = ["machine", "repeatability_m", "certificate_m", "common", "offsets_m"]
@@ -252,13 +243,11 @@ NUMBERS: dict[str, Callable[[], str]] = {
     "gain_six": lambda: gain(6, 9),
     "gain_nine": lambda: gain(9, 12),
     "gain_twelve": lambda: gain(12, 15),
-    "hours_six": lambda: ranged(planned(6, "hours"), ".1f"),
     "hours_nine": lambda: ranged(planned(9, "hours"), ".1f"),
     "hours_twelve": lambda: ranged(planned(12, "hours"), ".1f"),
     "hourly_six": lambda: ranged(hourly(6, 9), ".0f"),
     "hourly_nine": lambda: ranged(hourly(9, 12), ".0f"),
     "hourly_twelve": lambda: ranged(hourly(12, 15), ".0f"),
-    "last_paying": lambda: ranged(last_paying(), ".0f"),
     "gap_six": lambda: more(planned(6) / planned(6, "bound_um")),
     "gap_twelve": lambda: more(planned(12) / planned(12, "bound_um")),
     "more_precise": lambda: less(by_repeatability("twelve shifted", "nine shifted", 2e-7)),
@@ -272,7 +261,6 @@ NUMBERS: dict[str, Callable[[], str]] = {
     "size_large": lambda: ranged(elasticity(True), ".1f"),
     "size_precise": lambda: ranged(ends_of_size(2e-7), ".1f"),
     "size_noisy": lambda: ranged(ends_of_size(8e-7), ".1f"),
-    "balls_three": lambda: times(compared(3, "nine", 1)),
     "balls_seven": lambda: times(compared(7, "nine", 1)),
     "three_thrice": lambda: times(compared(3, "nine", 3)),
     "three_twelve": lambda: times(compared(3, "twelve", 1)),
@@ -286,8 +274,6 @@ NUMBERS: dict[str, Callable[[], str]] = {
     "hours_twelve_once": lambda: hours_of(5, "twelve", 1),
     "twice": lambda: less(compared(5, "nine", 2)),
     "twelve_once": lambda: less(compared(5, "twelve", 1)),
-    "thrice": lambda: less(compared(5, "nine", 3)),
-    "hours_thrice": lambda: hours_of(5, "nine", 3),
     "twice_precise": lambda: less(
         by_repeatability("nine shifted, read twice", "nine shifted", 2e-7)
     ),
@@ -332,10 +318,6 @@ NUMBERS: dict[str, Callable[[], str]] = {
     ),
     "lost_nine": lambda: more(losses("lost", "all")),
     "lost_six": lambda: more(losses("lost-six", "all six")),
-    "lost_open": lambda: ranged(table("lost-six")["rank_deficiency"], ".0f"),
-    "lost_middle": lambda: more(
-        values("lost", read="all but y middle") / values("lost", read="all")
-    ),
     "lost_precise": lambda: more(by_repeatability("nine shifted without y2", "nine shifted", 2e-7)),
     "lost_noisy": lambda: more(by_repeatability("nine shifted without y2", "nine shifted", 8e-7)),
     "repeatability_half": lambda: less(influence(repeatability_m=2e-7)),

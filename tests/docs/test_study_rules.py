@@ -17,6 +17,7 @@ import pytest
 import yaml
 
 STUDY = Path("designs/study")
+SWEEPS = STUDY / "sweeps"
 PAGE = Path("docs/explanation/rules.md").read_text(encoding="utf-8")
 RULES = re.split(r"^## ", PAGE, flags=re.MULTILINE)[1:]
 PLACEHOLDER = r"\{\{(\w+)\}\}"
@@ -308,7 +309,7 @@ def test_a_rule_has_range_picture_limits_and_files(rule: str) -> None:
     assert re.search(PLACEHOLDER, rule) and re.search(r"```\{study\} \w+\n:alt: .{30,}", rule)
     assert all(f"**{word}**" in rule for word in ("Fails", "Sensitivity", "From"))
     for name in re.findall(r"`([\w-]+)\.yaml`", rule.partition("**From**")[2]):
-        assert (STUDY / f"{name}.yaml").is_file() and rows(name)
+        assert (SWEEPS / f"{name}.yaml").is_file() and rows(name)
 
 
 def test_every_picture_is_shown() -> None:
@@ -317,10 +318,10 @@ def test_every_picture_is_shown() -> None:
 
 
 def test_every_sweep_has_its_table() -> None:
-    sweeps = {path.stem for path in STUDY.glob("*.yaml")} - {"machines"}
+    sweeps = {path.stem for path in SWEEPS.glob("*.yaml")}
     assert sweeps == {path.stem for path in (STUDY / "tables").glob("*.csv")}
     for name in sweeps:
-        axes = yaml.safe_load((STUDY / f"{name}.yaml").read_text(encoding="utf-8"))["axes"]
+        axes = yaml.safe_load((SWEEPS / f"{name}.yaml").read_text(encoding="utf-8"))["axes"]
         first = rows(name)[0]
         assert all(axis in first or f"{axis}_m" in first for axis in axes)
         assert {row["machine"] for row in rows(name)} == {
@@ -329,7 +330,7 @@ def test_every_sweep_has_its_table() -> None:
 
 
 def test_a_table_has_what_run_predicts() -> None:
-    recipes = yaml.safe_load((STUDY / "recipes.yaml").read_text(encoding="utf-8"))
+    recipes = yaml.safe_load((SWEEPS / "recipes.yaml").read_text(encoding="utf-8"))
     chosen = recipes["axes"]["recipe"]["values"][CORNERS]
     for experiment in bp.load_all(STUDY / "machines.yaml"):
         predicted = bp.run(experiment.with_({"positions": chosen})).quantities["U6"].average
