@@ -30,6 +30,7 @@ from .extensions.maps.interface import (
     map as map,
 )
 from .extensions.pages.interface import page as page
+from .extensions.pages.joint_table import joint_table as joint_table
 from .extensions.planning.criteria import Criterion as Criterion
 from .extensions.planning.interface import plan as plan
 from .extensions.repair.interface import repair as repair

@@ -263,8 +263,13 @@ def fit(
     ensure_one_of(("x", "y", "split", "none"), scale=scale)
     ensure_type(bool, "True or False", monomials=monomials, across_probes=across_probes)
     ensure_type(bool, "True or False", offsets=offsets)
-    asked: dict[str, object] = {"scale": scale, "offsets": not offsets, "pairs": pairs}
-    asked |= {"across_probes": across_probes, "monomials": monomials}
+    asked = {
+        "scale": scale,
+        "offsets": not offsets,
+        "pairs": pairs,
+        "across_probes": across_probes,
+        "monomials": monomials,
+    }
     wrong = takers(estimator, [name for name, value in asked.items() if value])
     if wrong is not None:
         raise ValueError(f"{wrong[0]} applies to the estimator {wrong[1]} only; leave it out")
@@ -272,9 +277,11 @@ def fit(
         "columns": columns,
         "unit": unit,
         "coordinates": coordinates,
+        "names": names,
+        "swap_names": swap_names,
+        "fill_down": fill_down,
+        "sheet": sheet,
     }
-    column_settings |= {"names": names, "swap_names": swap_names}
-    column_settings |= {"fill_down": fill_down, "sheet": sheet}
     chosen_experiment = experiment_of(experiment).with_readings(column_settings)
     chosen, observed = observed_of(chosen_experiment, readings, certificate)
     return fit_readings(

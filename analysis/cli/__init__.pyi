@@ -34,6 +34,7 @@ from .notes import (
 )
 from .outputs import (
     PARQUET as PARQUET,
+    XLSX as XLSX,
     Needed as Needed,
     Output as Output,
     OutputAction as OutputAction,

@@ -69,6 +69,7 @@ class Needed:
 
 PICTURE = Needed("pictures need", ("matplotlib",), "report")
 PARQUET = Needed("Parquet needs", ("pyarrow",), "parquet")
+XLSX = Needed("workbooks need", ("openpyxl",), "xlsx")
 
 
 @dataclass(frozen=True)
@@ -332,7 +333,7 @@ def _cannot(error: BaseException | None) -> str:
     """That a file cannot be written, why, and what to do."""
     if isinstance(error, ImportError):
         missing = (error.name or "").partition(".")[0]
-        for needed in (PICTURE, PARQUET):
+        for needed in (PICTURE, PARQUET, XLSX):
             if missing in needed.modules:
                 return needed.told
         raise error

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, ArgumentTypeError, Namespace
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 from ballplate.presentation.formatting import Data
-from ballplate.simulator.inputs.extensions import function, service
+from ballplate.simulator.inputs.extensions import function, optional_service, service
 
 from .common import (
     add_file,
@@ -21,21 +22,23 @@ from .common import (
     whole,
 )
 from .notes import complain, note_singular_values, progress
-from .outputs import UsageError, add_force, write
+from .outputs import XLSX, UsageError, add_force, add_output, write
 
 if TYPE_CHECKING:
     from ballplate.montecarlo.experiments import Trials
-    from ballplate.results.prediction import Prediction
     from ballplate.simulator.computing.steps import ProgressStep
     from ballplate.simulator.experiment.model import Experiment
 
+# Endings of files of joint tables.
+TABLES = (".csv", ".xlsx", ".tex", ".md", ".txt")
+MORE = "(for everything about one design, run its file alone, or with --variant NAME)"
 
 DESCRIPTION = (
     "Compute the rank and the standard uncertainties U1 to U6 of a design at zero"
-    " machine error. With --trials, synthetic data sets of the file's true machine are"
-    " estimated as well, and their bias, spread and coverage are printed with the"
-    " linearised uncertainties. The exit status is 0 if the rank is as expected,"
-    " otherwise 1."
+    " machine error, those of several designs in one table. With --trials, synthetic data"
+    " sets of the file's true machine are estimated as well, and their bias, spread and"
+    " coverage are printed with the linearised uncertainties. The exit status is 0 if the"
+    " rank is as expected, otherwise 1."
 )
 
 
@@ -58,6 +61,13 @@ def add_options(parser: ArgumentParser) -> None:
         action="store_true",
         help="print all that is taken for granted, U6 without it, and the entries that state it",
     )
+    add_output(
+        parser,
+        "--table",
+        metavar="FILE",
+        needed=lambda path: XLSX if path.suffix.lower() == ".xlsx" else None,
+        help="write the joint table of all designs: .csv, .xlsx, .tex, .md or .txt",
+    )
     add_page(parser, "write the design as a page of HTML that needs no other file and no network")
     add_force(parser)
     add_json(parser)
@@ -75,38 +85,52 @@ def _trial_count(text: str) -> int:
 def run(options: Namespace) -> int:
     """Plan all experiments of the files; 1 if the rank of one is not as expected."""
     from ballplate.results.prediction import predict
+    from ballplate.simulator.computing.steps import counted
 
-    plans, results, interrupted = [], [], False
+    results: list[Data] = []
+    interrupted = False
     with_trials = options.trials is not None or options.until is not None
     if not with_trials and (options.seed is not None or options.workers is not None):
         raise UsageError("--seed and --workers apply to --trials or --until only; leave them out")
     if options.assumptions:
         service("assumption_effects")
+    if options.table and options.table.suffix.lower() not in TABLES:
+        raise UsageError(f"{options.table} should end in {', '.join(TABLES)}")
+    joint: Any = (service if options.table else optional_service)("JointTable")
     chosen = experiments(options)
     if options.report and len(chosen) > 1:
         names = ", ".join(str(experiment.name or experiment.label) for experiment in chosen)
         raise UsageError(f"--report is the page of one design; choose one with --variant: {names}")
-    for experiment in chosen:
-        plans.append(predict(experiment))
+    with progress(options) as shown:
+        plans = [*map(predict, counted(chosen, "designs", len(chosen), shown.show))]
+    if options.table:
+        write(options, {options.table: joint(tuple(plans)).write_to})
+    is_joint = joint is not None and len(plans) > 1
+    if is_joint and not options.json:
+        print_lines([*str(joint(tuple(plans))).splitlines(), MORE])
+    for experiment, plan in zip(chosen, plans, strict=True):
+        heading = ["", plan.heading] if is_joint else [""]
         if options.report:
-            _write_page(options, plans[-1])
+            with progress(options) as shown:
+                text = function("page")(plan, report=shown.show)
+            write(options, {options.report: text})
         if not options.json:
-            print_lines([*([""] if len(plans) > 1 else []), *plans[-1].lines()])
-            note_singular_values(options, plans[-1].verdict)
+            if not is_joint:
+                print_lines([*([""] if results else []), *plan.lines()])
+            note_singular_values(options, plan.verdict)
             if options.assumptions:
-                assumed = plans[-1].assumptions
+                assumed = plan.assumptions
                 none = ["assumptions: not evaluated; U6 is undetermined, zero or not computed"]
-                print_lines(["", *(none if assumed is None else assumed.lines())])
-        data: Data = plans[-1].to_dict()
+                print_lines([*heading, *(none if assumed is None else assumed.lines())])
         if with_trials:
-            from ballplate.montecarlo.comparison_tables import trials_data, trials_lines
+            from ballplate.montecarlo.comparison_tables import trials_lines
 
-            trials_done = _trials(experiment, options)
-            data["monte_carlo"] = trials_data(trials_done)
+            done = _trials(experiment, options)
+            plan = replace(plan, monte_carlo=done)
             if not options.json:
-                print_lines(["", *trials_lines(trials_done)])
-            interrupted = trials_done.outcome is not None and trials_done.outcome.interrupted
-        results.append(data)
+                print_lines([*heading, *trials_lines(done)])
+            interrupted = done.outcome is not None and done.outcome.interrupted
+        results.append(plan.to_dict())
         if interrupted:
             complain(
                 f"{options.interruption.word}: the results are those of the data sets done so far"
@@ -117,12 +141,6 @@ def run(options: Namespace) -> int:
     if interrupted:
         return int(options.interruption.status)
     return 0 if all(p.verdict.as_expected for p in plans) else 1
-
-
-def _write_page(options: Namespace, prediction: Prediction) -> None:
-    with progress(options) as shown:
-        text = function("page")(prediction, report=shown.show)
-    write(options, {options.report: text})
 
 
 def _trials(experiment: Experiment, options: Namespace) -> Trials:

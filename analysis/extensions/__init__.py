@@ -249,7 +249,8 @@ SHIPPED = (
     ),
     _here(
         "pages",
-        functions=_from("interface", "page"),
+        functions=_from("interface", "page") | _from("joint_table", "joint_table"),
+        services=_from("joint_table", "JointTable"),
     ),
     _here(
         "sweeps",

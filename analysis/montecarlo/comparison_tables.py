@@ -149,7 +149,7 @@ def _misfit_lines(result: Trials, outcome: MonteCarloOutcome) -> list[str]:
 
 
 def trials_data(result: Trials) -> Data:
-    """Return replicates as plain data in metres and radians at full precision."""
+    """Return replicates as data in metres and radians at full precision; NaN if undetermined."""
     outcome = result.outcome
     if outcome is None:
         return {"reason": result.reason}
@@ -191,8 +191,8 @@ def trials_data(result: Trials) -> Data:
 def _comparison_data(comparison: MonteCarloComparison) -> Data:
     return {
         **picked(comparison, "unit", "count", "sampled"),
-        "linear": _finite(maximum=comparison.linear_maximum, average=comparison.linear_average),
-        "actual": _finite(maximum=comparison.actual_maximum, average=comparison.actual_average),
+        "linear": {"maximum": comparison.linear_maximum, "average": comparison.linear_average},
+        "actual": {"maximum": comparison.actual_maximum, "average": comparison.actual_average},
         "spread_ratio": _figure(comparison.spread),
         "actual_ratio": _figure(comparison.actual),
         "bias_ratio": _figure(comparison.bias),
@@ -203,10 +203,5 @@ def _comparison_data(comparison: MonteCarloComparison) -> Data:
     }
 
 
-def _figure(figure: MonteCarloEstimate) -> dict[str, float | None]:
-    return _finite(value=figure.value, standard_error=figure.error)
-
-
-def _finite(**values: float) -> dict[str, float | None]:
-    """Return values by name, None instead of one that is not finite."""
-    return {name: value if math.isfinite(value) else None for name, value in values.items()}
+def _figure(figure: MonteCarloEstimate) -> Data:
+    return {"value": figure.value, "standard_error": figure.error}

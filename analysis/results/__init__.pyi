@@ -59,6 +59,7 @@ from .residuals import (
 )
 from .text_blocks import (
     iteration_lines as iteration_lines,
+    map_lines as map_lines,
     scale_lines as scale_lines,
     target_lines as target_lines,
     verdict_lines as verdict_lines,

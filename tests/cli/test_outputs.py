@@ -111,7 +111,8 @@ class TestToldBeforeTheWork:
         self, files: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
     ) -> None:
         extras = {".svg": "report", ".png": "report", ".pdf": "report", ".parquet": "parquet"}
-        for name in ("matplotlib", "pyarrow"):
+        extras[".xlsx"] = "xlsx"
+        for name in ("matplotlib", "pyarrow", "openpyxl"):
             monkeypatch.setitem(sys.modules, name, None)
         for command, option in WRITING:
             path = files / f"new-{WALK[command].writes[option]}"

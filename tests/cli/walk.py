@@ -107,7 +107,7 @@ WALK = {
     "sweep --export": Walk({"STORE": "store.sqlite"}, {"-o": "t.parquet"}, prints=False),
     "sweep --report": Walk({"STORE": "store.sqlite"}, {"-o": "t.md"}, prints=False),
     "check": Walk(EXPERIMENT, {}),
-    "run": Walk(EXPERIMENT, {"--report": "design.html"}, also=BALLS_TOO),
+    "run": Walk(EXPERIMENT, {"--report": "design.html", "--table": "t.xlsx"}, also=BALLS_TOO),
     "reach": Walk(EXPERIMENT, {}, ("--by", "repeatability")),
     "compare": Walk(EXPERIMENT, {}, ("--trials", "2", "--points", "5")),
     # A store is no file that is replaced; what it refuses is tested with it.

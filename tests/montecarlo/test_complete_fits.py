@@ -19,6 +19,7 @@ from ballplate.montecarlo.accumulator import accumulate
 from ballplate.montecarlo.comparison_tables import trials_data, trials_lines
 from ballplate.montecarlo.experiments import Trials, true_experiment
 from ballplate.montecarlo.figures import MonteCarloOutcome, outcome
+from ballplate.presentation.formatting import as_data
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.gauss_newton import estimate
 from ballplate.simulator.geometry.motions import rotation_from_vector
@@ -165,7 +166,7 @@ def test_where_too_many_fail_no_figure_is_shown(failing: int, shown: bool) -> No
     lines = "\n".join(trials_lines(Trials(1, told)))
     assert (told.comparisons != {}) == shown == ("spread / U" in lines) == (not told.reason)
     assert (f"{failing} data sets did not converge" in lines) == (failing > 0)
-    data = trials_data(Trials(1, told))
+    data = as_data(trials_data(Trials(1, told)))
     assert (data["quantities"] != {}) == shown and len(data["not_converged"]) == failing
     figures = trial_figures(told, ("U6",))
     assert ("U6_spread_ratio" in figures) == shown == ("sum_of_squares" in figures)

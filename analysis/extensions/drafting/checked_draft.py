@@ -7,10 +7,12 @@ from collections.abc import Mapping
 from math import ceil
 from pathlib import Path
 
+from ballplate.extensions.planning import HOUR, spent_as_drawn
 from ballplate.simulator.experiment import Experiment, load
 
 from .data_sheet import DataSheet
 from .draft import draft
+from .places import strategies_of
 
 
 def checked_draft(
@@ -23,7 +25,7 @@ def checked_draft(
     chosen = path.with_name(f"{path.stem}-chosen.yaml")
     plan = ["ballplate", "plan", path, "--hours", f"{sheet.hours:g}", "-o", chosen]
     command = shlex.join(map(str, plan))
-    text = draft(sheet, texts, command)
+    text = drafted(path, sheet, texts, command)
     (experiment,) = load(path, planning=True, text=text)
     least = _least_hours(experiment)
     if sheet.hours < least:
@@ -34,6 +36,21 @@ def checked_draft(
             f"{sheet.hours:g} h is too short: {few} take {ceil(10 * least) / 10:g} h; give more"
         )
     return text, command, experiment
+
+
+def drafted(path: Path, sheet: DataSheet, texts: Mapping[str, str], command: str) -> str:
+    """Return the text of a file with the longest simple strategy for which the hours suffice, or
+    the shortest.
+
+    :raises ValueError: the plate, the tips and the volume do not go together.
+    """
+    strategies = list(strategies_of(sheet.tips_there, sheet.places))
+    for starts in reversed(strategies[1:]):
+        text = draft(sheet, texts, command, starts)
+        (experiment,) = load(path, text=text)
+        if spent_as_drawn(experiment).seconds <= HOUR * sheet.hours:
+            return text
+    return draft(sheet, texts, command, strategies[0])
 
 
 def _least_hours(experiment: Experiment) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.resources import files
 from string import Template
 from typing import Any
@@ -12,7 +12,7 @@ from ballplate.simulator.inputs import LengthFunction, Target, typed_length, yam
 
 from .data_sheet import DataSheet
 from .machine_tables import chain_words, table
-from .places import Settings, Tips, starts_of
+from .places import Settings, Tips
 from .sheet_values import function_text, rounded
 
 # The standard uncertainty of a reading, as a share of the constant part of the MPE.
@@ -24,14 +24,15 @@ TARGET = 1 / 2
 ERRORS = 1 / 8
 
 
-def draft(sheet: DataSheet, texts: Mapping[str, str], next_command: str) -> str:
-    """Return the text of an experiment file; `texts` as stated and `next_command` go into its
-    comments.
+def draft(
+    sheet: DataSheet, texts: Mapping[str, str], next_command: str, starts: Sequence[Settings]
+) -> str:
+    """Return the text of an experiment file with the positions `starts`; `texts` as stated and
+    `next_command` go into its comments.
 
     :raises ValueError: the plate, the tips and the volume do not go together.
     """
     places, tips, mpe = sheet.places, sheet.tips_there, sheet.mpe
-    starts = list(starts_of(tips, places))
     error = ERRORS * float(mpe.at(np.linalg.norm(sheet.volume)))
     usual = LengthFunction(TARGET * mpe.constant, TARGET * mpe.slope)
     target = sheet.target or Target(usual, 2.0)
@@ -66,6 +67,7 @@ def draft(sheet: DataSheet, texts: Mapping[str, str], next_command: str) -> str:
         probes=_tips(tips, rounded(sheet.tips.uncertainty)),
         influences=_influences(sheet.temperature),
         plate=_flow(plate | {"role": "plate"}),
+        rule=rule(sheet, len(starts)),
         positions=_entries(starts),
         certificate=function_text(sheet.certificate.stated),
         factor=f"{sheet.certificate.coverage_factor:g}",
@@ -75,6 +77,17 @@ def draft(sheet: DataSheet, texts: Mapping[str, str], next_command: str) -> str:
         target=function_text(target.stated),
         target_words="as stated" if sheet.target else "half the MPE",
         coverage_factor=f"{target.coverage_factor:g}",
+    )
+
+
+def rule(sheet: DataSheet, count: int) -> str:
+    """Return why a draft has so many positions, as lines of a comment; empty without a choice."""
+    if len(table("starts")[sheet.tips_there.form][sheet.tips_there.pointing]) == 1:
+        return ""
+    nearness = table("nearness")[str(count)]
+    return (
+        f"\n# {count} positions of a simple strategy, as {sheet.hours:g} h allow; on machines of"
+        f" many shapes, U6 was {nearness} times\n# that of a plan of as many positions."
     )
 
 

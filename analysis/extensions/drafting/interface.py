@@ -18,6 +18,7 @@ def design(
     target: str | None = None,
     repeatability: str | None = None,
     temperature: str | None = None,
+    hours: str | None = None,
 ) -> Experiment:
     """Return an experiment with a pool, drafted from a machine's data sheet as by `ballplate init`.
 
@@ -29,7 +30,7 @@ def design(
     standard uncertainty of offsets. The target is one of the expanded uncertainty of lengths, by
     default half the MPE; the repeatability is a standard deviation, by default a third of the
     constant part of the MPE; the temperature is the standard uncertainty of temperatures, by
-    default exactly known.
+    default exactly known; the hours, by default 6, decide how many positions it begins with.
 
     :raises ValueError: a text cannot be read, or the plate does not fit into the volume within the
         reach of the tips.
@@ -39,8 +40,8 @@ def design(
     >>> bp.design("moving bridge", certificate="0.4 um + 0.5 um/m, k=2", **sheet)
     <Experiment design: ball plate on a machine of type moving bridge>
     """
+    from .checked_draft import drafted
     from .data_sheet import data_sheet
-    from .draft import draft
 
     texts = {
         "machine_type": machine_type,
@@ -52,8 +53,9 @@ def design(
         "target": target or "",
         "repeatability": repeatability or "",
         "temperature": temperature or "",
+        "hours": hours or "",
     }
     for name, text in texts.items():
         ensure_type(str, "a text, of a quantity with its unit", **{name: text})
-    text = draft(data_sheet(texts), texts, "ballplate plan")
-    return load(Path("design.yaml"), text=text)[0]
+    path = Path("design.yaml")
+    return load(path, text=drafted(path, data_sheet(texts), texts, "ballplate plan"))[0]

@@ -104,14 +104,20 @@ def places_of(plate: Plate, tips: Tips, volume: tuple[float, ...]) -> Iterator[S
         yield from (place | {"probes": names} for place in places)
 
 
-def starts_of(tips: Tips, places: list[Settings]) -> Iterator[Settings]:
-    """Yield the usual positions to start with, turned by another quarter where they fit only so."""
-    for start in table("starts")[tips.form][tips.pointing]:
-        fitting = [one for one in places if one.get("planes", []) == [*start.get("plane", "")]]
-        turns = {place.get("quarter_turns") for place in fitting}
-        if start.get("quarter_turns", turns) not in (turns, *turns):
-            start = start | {"quarter_turns": start["quarter_turns"] ^ 1}
-        yield start | {"probes": fitting[0]["probes"]}
+def strategies_of(tips: Tips, places: list[Settings]) -> Iterator[list[Settings]]:
+    """Yield simple strategies of positions to start with, the shortest first; positions are turned
+    by another quarter where they fit only so.
+    """
+    for strategy in table("starts")[tips.form][tips.pointing]:
+        yield [_fitted(start, places) for start in strategy]
+
+
+def _fitted(start: Settings, places: list[Settings]) -> Settings:
+    fitting = [one for one in places if one.get("planes", []) == [*start.get("plane", "")]]
+    turns = {place.get("quarter_turns") for place in fitting}
+    if start.get("quarter_turns", turns) not in (turns, *turns):
+        start = start | {"quarter_turns": start["quarter_turns"] ^ 1}
+    return start | {"probes": fitting[0]["probes"]}
 
 
 def _across(plane: str, plate: Plate, ends: Array) -> Iterator[Settings]:

@@ -1,1 +1,3 @@
-"""Pages of results: self-contained HTML, made of sections that are functions of results."""
+"""Pages of results, self-contained HTML made of sections that are functions of results, and joint
+tables.
+"""

@@ -24,7 +24,8 @@ LETTERS = 12
 @dataclass(frozen=True, eq=False)
 class Trace:
     """Values `y` (m,) over `x` (m,), possibly NaN: a line, dots, or a band up to `upper` (m,).
-    `style` is a class of the page.
+    `style` is a class of the page. `notes` are, for each dot, its text and the id of the element
+    that it leads to, which may be empty.
     """
 
     kind: str
@@ -32,6 +33,7 @@ class Trace:
     x: Array
     y: Array
     upper: Array | None = None
+    notes: Sequence[tuple[str, str]] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,18 +49,19 @@ class Chart:
     places: Sequence[tuple[float, str]] = ()
     from_zero: bool = False
     height: float = HEIGHT
+    width: float = WIDTH
 
 
 def chart_svg(chart: Chart) -> Html:
     """The chart as an element of a page."""
     horizontal, vertical = _limits(chart)
-    scale = _Scale(horizontal, vertical, chart.height)
+    scale = _Scale(horizontal, vertical, chart.height, chart.width)
     parts = [*_grid(chart, scale), *(_trace(trace, scale) for trace in chart.traces)]
     return element(
         "svg",
         joined(parts),
-        class_="chart",
-        viewBox=f"0 0 {WIDTH:g} {chart.height:g}",
+        class_="chart" if chart.width == WIDTH else "chart full",
+        viewBox=f"0 0 {chart.width:g} {chart.height:g}",
         role="img",
         aria_label=chart.words,
     )
@@ -69,10 +72,11 @@ class _Scale:
     across: tuple[float, float]
     up: tuple[float, float]
     height: float
+    width: float
 
     def x(self, values: Array) -> Array:
         low, high = self.across
-        return np.asarray(LEFT + (values - low) / (high - low) * (WIDTH - LEFT - RIGHT))
+        return np.asarray(LEFT + (values - low) / (high - low) * (self.width - LEFT - RIGHT))
 
     def y(self, values: Array) -> Array:
         low, high = self.up
@@ -89,10 +93,10 @@ def _limits(chart: Chart) -> tuple[tuple[float, float], tuple[float, float]]:
     low = min(ends[0], 0.0) if chart.from_zero else ends[0]
     room = 0.06 * ((ends[1] - low) or abs(low) or 1.0)
     vertical = (0.0 if chart.from_zero and low >= 0.0 else low - room, ends[1] + room)
-    if chart.places:
-        return (-0.5, len(chart.places) - 0.5), vertical
-    low, high = _ends(across)
-    return (low, high if high > low else low + 1.0), vertical
+    where = np.array([x for x, _ in chart.places])
+    low, high = _ends(where if chart.places else across)
+    beside = 0.5 * ((high - low) / max(len(where) - 1, 1) or 1.0) if chart.places else 0.0
+    return (low - beside, high + beside if high > low or beside else low + 1.0), vertical
 
 
 def _ends(values: Array) -> tuple[float, float]:
@@ -119,7 +123,7 @@ def _grid(chart: Chart, scale: _Scale) -> list[Html]:
         ticks(*scale.up), scale.y(np.array(ticks(*scale.up))).tolist(), strict=True
     ):
         kind = "zero" if value == 0.0 and scale.up[0] < 0.0 else "grid"
-        lines.append(_path(f"M{LEFT:g} {y:.1f}H{WIDTH - RIGHT:g}", kind))
+        lines.append(_path(f"M{LEFT:g} {y:.1f}H{scale.width - RIGHT:g}", kind))
         texts.append(_text(LEFT - 5, y + 3.5, f"{value:g}", "end"))
     if chart.places:
         for x, name in _shown_places(chart, scale):
@@ -129,7 +133,7 @@ def _grid(chart: Chart, scale: _Scale) -> list[Html]:
         for value, x in zip(values, scale.x(np.array(values)).tolist(), strict=True):
             lines.append(_path(f"M{x:.1f} {ABOVE:g}V{bottom:g}", "grid"))
             texts.append(_text(x, bottom + 13, f"{value:g}", "middle"))
-    texts.append(_text((LEFT + WIDTH - RIGHT) / 2, bottom + 28, chart.across, "middle"))
+    texts.append(_text((LEFT + scale.width - RIGHT) / 2, bottom + 28, chart.across, "middle"))
     middle = ABOVE + (bottom - ABOVE) / 2
     turned = f"rotate(-90 11 {middle:g})"
     texts.append(element("text", chart.up, x=11, y=middle, text_anchor="middle", transform=turned))
@@ -139,12 +143,11 @@ def _grid(chart: Chart, scale: _Scale) -> list[Html]:
 def _shown_places(chart: Chart, scale: _Scale) -> list[tuple[float, str]]:
     """Return names along the axis if they fit, otherwise some of their numbers."""
     where = scale.x(np.array([x for x, _ in chart.places])).tolist()
-    room = (WIDTH - LEFT - RIGHT) / max(len(where), 1)
+    room = (scale.width - LEFT - RIGHT) / max(len(where), 1)
     longest = max(len(name) for _, name in chart.places)
     if 5.6 * min(longest, LETTERS) < room:
-        names = [
-            name if len(name) <= LETTERS else f"{name[: LETTERS - 1]}…" for _, name in chart.places
-        ]
+        most = max(LETTERS, int(room / 5.6))
+        names = [name if len(name) <= most else f"{name[: most - 1]}…" for _, name in chart.places]
         return list(zip(where, names, strict=True))
     every = -(-24 // max(int(room), 1))
     return [(x, str(k + 1)) for k, x in enumerate(where) if k % every == 0]
@@ -156,21 +159,25 @@ def _trace(trace: Trace, scale: _Scale) -> Html:
         is_finite &= np.isfinite(trace.upper)
     x, y = np.round(scale.x(trace.x), 1).tolist(), np.round(scale.y(trace.y), 1).tolist()
     runs = _runs(is_finite)
+    if trace.notes:
+        dots = (_noted(x[k], y[k], trace.style, *trace.notes[k]) for run in runs for k in run)
+        return joined(dots)
     if trace.kind == "dots":
         path = "".join(f"M{x[k]:g} {y[k]:g}h0" for run in runs for k in run)
     elif trace.upper is not None:
         top = np.round(scale.y(trace.upper), 1).tolist()
-        path = "".join(
-            _line([x[k] for k in run], [y[k] for k in run])
-            + _line([x[k] for k in reversed(run)], [top[k] for k in reversed(run)]).replace(
-                "M", "L"
-            )
-            + "Z"
-            for run in runs
-        )
+        back = (_line(x, top, run[::-1]).replace("M", "L") for run in runs)
+        path = "".join(f"{_line(x, y, run)}{end}Z" for run, end in zip(runs, back, strict=True))
     else:
-        path = "".join(_line([x[k] for k in run], [y[k] for k in run]) for run in runs)
+        path = "".join(_line(x, y, run) for run in runs)
     return _path(path, f"{trace.kind} {trace.style}")
+
+
+def _noted(x: float, y: float, style: str, words: str, target: str) -> Html:
+    """A dot with its text. Tables have the links for those who use no pointer."""
+    dot = _path(f"M{x:g} {y:g}h0", f"dots noted {style}")
+    href = f"#{target}" if target else None
+    return element("a", element("title", words), dot, href=href, tabindex=-1)
 
 
 def _runs(is_finite: np.ndarray) -> list[list[int]]:
@@ -181,9 +188,8 @@ def _runs(is_finite: np.ndarray) -> list[list[int]]:
     ]
 
 
-def _line(x: Sequence[float], y: Sequence[float]) -> str:
-    points = [f"{a:g} {b:g}" for a, b in zip(x, y, strict=True)]
-    return f"M{'L'.join(points)}" if points else ""
+def _line(x: Sequence[float], y: Sequence[float], run: Sequence[int]) -> str:
+    return f"M{'L'.join(f'{x[k]:g} {y[k]:g}' for k in run)}"
 
 
 def _path(d: str, kind: str) -> Html:

@@ -18,9 +18,10 @@ OUT = np.array([[0.0, -0.5, -0.85], [0.7, 0.0, -0.7], [-0.9, -0.9, 0.0]])
 THICKNESS = 0.014
 
 
-def volume_layers(design: Design) -> list[Layer]:
-    """The volume with the names of its axes, ticks in millimetres, and the origin."""
-    lower, upper = design.machine.volume.lower, design.machine.volume.upper
+def volume_layers(lower: Array, upper: Array) -> list[Layer]:
+    """The volume between two corners (d,) with the names of its axes, ticks in millimetres, and the
+    origin.
+    """
     d = len(lower)
     _, away = projection(d)
     edges, hidden = box_edges(lower, upper, away)
@@ -70,43 +71,58 @@ def _ticks(low: float, high: float) -> list[float]:
 def volume_view(design: Design) -> SpatialPicture:
     """Positions in the volume, the balls that are read, some of each position, and styli."""
     where = locations(design, nominal_state(design), design.readings)
-    layers = volume_layers(design)
-    (_, up), _ = projection(design.dimension)
-    thickness = THICKNESS * float(design.machine.volume.size.max())
-    labels, names, styli = [], [], []
-    positions_read = [
-        k for k in range(len(design.positions.names)) if (design.readings.position == k).any()
-    ]
-    position_names = [design.positions.names[k] for k in positions_read]
-    is_named = names_fit(position_names)
-    for number, k in enumerate(positions_read):
+    volume = design.machine.volume
+    balls, styli, positions = [], [], []
+    for k, name in enumerate(design.positions.names):
         mine = np.flatnonzero(design.readings.position == k)
-        balls = where[mine]
-        outline = _outline(balls)
-        if len(outline) > 2:
-            layers.append(Layer("areas", "plate", outline, (len(outline),)))
-        layers.append(_edges(outline, thickness))
-        layers.append(Layer("dots", "plate", balls[_some(design.readings.ball[mine])]))
-        middle = balls[np.linalg.norm(balls - balls.mean(axis=0), axis=1).argmin()]
+        if not len(mine):
+            continue
+        read = where[mine]
+        positions.append((name, read))
+        balls.append(Layer("dots", "plate", read[_some(design.readings.ball[mine])]))
+        middle = read[np.linalg.norm(read - read.mean(axis=0), axis=1).argmin()]
         offsets = design.probes.offsets[np.unique(design.readings.probe[mine])]
         styli += [np.stack([middle, middle - offset]) for offset in offsets if offset.any()]
-        # Plates in a plane do not hide one another's middle.
-        centre, top = outline.mean(axis=0), outline[(outline @ up).argmax()]
-        labels.append(centre if design.dimension == 2 else top + 0.12 * (top - centre))
-        names.append(position_names[number] if is_named else str(number + 1))
     if styli:
-        layers.append(Layer("lines", "ink fine", np.concatenate(styli), (2,) * len(styli)))
-        layers.append(Layer("dots", "ink", np.stack([stylus[1] for stylus in styli])))
-    layers.append(Layer("labels", "names", np.array(labels), names=tuple(names)))
-    words = f"{len(positions_read)} positions in the volume, which the run sheet lists"
+        balls.append(Layer("lines", "ink fine", np.concatenate(styli), (2,) * len(styli)))
+        balls.append(Layer("dots", "ink", np.stack([stylus[1] for stylus in styli])))
+    words = f"{len(positions)} positions in the volume, which the run sheet lists"
     caption = (
         "Positions in the volume: balls that are read, and from one ball of each position the styli"
         " to the machine's reference point."
     )
-    if not is_named:
+    if not names_fit([name for name, _ in positions]):
         caption += " Positions are numbered as in the run sheet."
     if len(design.readings.ball) and max(_counts(design)) > MOST_BALLS:
         caption += " Only some of the balls are drawn."
+    return plates_view(volume.lower, volume.upper, positions, words, caption, balls)
+
+
+def plates_view(
+    lower: Array,
+    upper: Array,
+    positions: Sequence[tuple[str, Array]],
+    words: str,
+    caption: str,
+    more: Sequence[Layer] = (),
+) -> SpatialPicture:
+    """Return plates in the volume between two corners (d,) by the name of each position and points
+    (k, d) at the edge of its plate, and `more` in front of them.
+    """
+    layers = volume_layers(lower, upper)
+    (_, up), _ = projection(len(lower))
+    thickness = THICKNESS * float((upper - lower).max())
+    labels, names = [], [name for name, _ in positions]
+    for _, points in positions:
+        outline = _outline(points)
+        if len(outline) > 2:
+            layers.append(Layer("areas", "plate", outline, (len(outline),)))
+        layers.append(_edges(outline, thickness))
+        # Plates in a plane do not hide one another's middle.
+        centre, top = outline.mean(axis=0), outline[(outline @ up).argmax()]
+        labels.append(centre if len(lower) == 2 else top + 0.12 * (top - centre))
+    shown = names if names_fit(names) else [str(k + 1) for k in range(len(names))]
+    layers += [*more, Layer("labels", "names", np.array(labels), names=tuple(shown))]
     return SpatialPicture(layers, words, caption)
 
 

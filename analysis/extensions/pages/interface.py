@@ -10,9 +10,11 @@ from ballplate.simulator.computing import Report, unreported
 from ballplate.simulator.experiment import Experiment
 from ballplate.simulator.inputs import ensure_path, ensure_report
 
-from .charts import Chart, Trace, chart_svg, figure, figures, legend
+from .charts import Chart, Trace, chart_svg, figure, legend
+from .design_views import plates_view
 from .document import Page, PageSection, facts_list, written
-from .elements import Html, element, joined, note, sentence, table
+from .elements import Html, element, folded, joined, note, sentence, table
+from .spatial import still_figure
 
 if TYPE_CHECKING:
     from ballplate.results import Fit, Prediction
@@ -28,12 +30,14 @@ __all__ = [
     "element",
     "facts_list",
     "figure",
-    "figures",
+    "folded",
     "joined",
     "legend",
     "note",
     "page",
+    "plates_view",
     "sentence",
+    "still_figure",
     "table",
     "written",
 ]

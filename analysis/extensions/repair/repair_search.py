@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import inf
 
+from ballplate.extensions.drafting.strategies import as_drafted
+from ballplate.presentation import number
 from ballplate.results import Prediction, predict
 from ballplate.simulator.computing import Report, counted, single_threaded, unreported
 from ballplate.simulator.experiment import Experiment, placed_only
-from ballplate.simulator.inputs import ExperimentError
-from ballplate.uncertainty import OFFSET_TRIAL, lengths_with_offsets
+from ballplate.simulator.inputs import ExperimentError, yaml_text
+from ballplate.uncertainty import OFFSET_TRIAL, exact_offsets, lengths_with_offsets
 
 from .candidates import candidates
 from .changes import ChangeKind, changed
@@ -136,4 +138,25 @@ def loosened(experiment: Experiment) -> float:
 
 def suggested(experiment: Experiment, prediction: Prediction, report: Report) -> Repairs:
     """Return suggestions for an experiment with its pool, whose design has this prediction."""
-    return repairs(experiment, report)
+    return replace(repairs(experiment, report), strategy=tuple(better_strategy(experiment)))
+
+
+def better_strategy(experiment: Experiment) -> Iterator[str]:
+    """Yield lines on the longest simple strategy of no more positions and readings, if lengths are
+    less uncertain with it; none otherwise.
+    """
+    before = loosened(experiment)
+    positions, drafted = next(as_drafted(placed_only(experiment)), ([], None))
+    after = inf if drafted is None else loosened(drafted)
+    if drafted is None or not after < IMPROVED * before:
+        return
+    own = "is undetermined" if before == inf else f"is {number(1e6 * before)} µm"
+    if exact_offsets(experiment):
+        own += f", both with {1e6 * OFFSET_TRIAL:g} µm on the exact probe offsets"
+    yield (
+        f"strategy: with the {len(positions)} positions of a simple strategy average U6 would be"
+        f" {number(1e6 * after)} µm, where it {own}; a plan may do better still"
+    )
+    yield "strategy, in the file: positions:"
+    for position in positions:
+        yield f"strategy, in the file: - {yaml_text(position, flow_style=True).strip()}"

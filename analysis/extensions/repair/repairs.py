@@ -117,10 +117,13 @@ class Repair:
 
 @dataclass(frozen=True)
 class Repairs:
-    """Repairs of a design, the best first; without any, the `reason` if it needs one."""
+    """Repairs of a design, the best first; without any, the `reason` if it needs one. `strategy`
+    has lines on positions that would do better than its own.
+    """
 
     repairs: tuple[Repair, ...] = ()
     reason: str = ""
+    strategy: tuple[str, ...] = ()
 
     def to_write(self, judged: Verdict, nothing_weak: bool = False) -> Repair | None:
         """Return the best repair that may be written without a question, unless the design needs
@@ -138,9 +141,10 @@ class Repairs:
         for k, repair in enumerate(self.repairs, start=1):
             lines.append(f"repair {k}: {repair.words}: {repair.outcome}")
             lines += [f"repair {k}, in the file: {edit}" for edit in repair.edits]
-        return lines
+        return [*lines, *self.strategy]
 
     def to_dict(self) -> Data:
         """Return repairs as plain data in metres at full precision, if any are needed."""
         is_needed = bool(self.repairs or self.reason)
-        return {"repairs": [each.to_dict() for each in self.repairs] if is_needed else None}
+        found = [each.to_dict() for each in self.repairs] if is_needed else None
+        return {"repairs": found, "strategy": self.strategy}

@@ -5,37 +5,40 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from ballplate.presentation import number, percent
 from ballplate.simulator.computing import comparable
 from ballplate.simulator.design import Flags
 from ballplate.simulator.inputs import listing, number_of
-from ballplate.simulator.machines import Array, Integers
+from ballplate.simulator.machines import Integers
 from ballplate.uncertainty import RECORDED
 from numpy.typing import NDArray
 
-from .cases import SweepCases, column_unit
+from .cases import SweepCases, described
 
 # Cases in the table of the best.
 LISTED = 8
 
 WITHIN = "U6_within_target"
+NO_U6 = "U6 is not recorded, so that no case is compared with a target uncertainty."
+NO_TARGET = "No case has a target uncertainty for its lengths."
 
 # Quantities to judge cases by: the average of the first that is recorded.
 PREFERRED = ("U6", "U4", "U5", "U1", "U3_lengths", "U2_lengths", "U3", "U2")
-CRITERIA = (*PREFERRED, *(symbol for symbol in RECORDED if symbol not in PREFERRED))
+CRITERIA = tuple(dict.fromkeys((*PREFERRED, *RECORDED)))
 
 
 @dataclass(frozen=True, eq=False)
 class SweepAnswer:
     """Sentences, and the rows of the best cases, best first; `case` is the number of the best.
 
-    `is_good` unless no case meets an existing target.
+    `is_good` unless no case meets an existing target; `outstanding` are rows to show first, each
+    with its sentence.
     """
 
     sentences: tuple[str, ...]
     best: tuple[int, ...]
     case: int
     is_good: bool
+    outstanding: dict[int, str]
 
 
 def answer(result: SweepCases) -> SweepAnswer | None:
@@ -43,32 +46,61 @@ def answer(result: SweepCases) -> SweepAnswer | None:
     column, done = criterion(result), np.flatnonzero(result.done)
     if column is None or not len(done):
         return None
-    value, observations = result.figure(column)[done], result.figure("observations")[done]
-    partly = ~np.isfinite(value)
-    share = result.figure(WITHIN)[done]
-    meets = share == 1.0
-    if np.isfinite(share).any():
-        sentences = _sentences_with_target(result, done, column, share, observations, value)
-        order = (
-            best_first(~meets, observations, value) if meets.any() else best_first(-share, value)
-        )
+    value, share, cost = (result.figure(name)[done] for name in (column, WITHIN, "hours"))
+    meets, judged, known = share == 1.0, np.isfinite(share), np.isfinite(value)
+    unit = "known laboratory hours"
+    if not np.isfinite(cost[meets]).any():
+        unit, cost = "observations", result.figure("observations")[done]
+    # Cases to find: by a figure, among some.
+    wanted = [(f"Smallest average of {quantity(column)}", known, value)]
+    if meets.any():
+        order = best_first(~meets, comparable(cost), value)
+        words = f"Fewest {unit} of the cases that meet the target"
+        wanted.append((words, meets & np.isfinite(cost), cost))
+    elif judged.any():
+        order = best_first(-share, value)
+        wanted.append(("Nearest to the target", judged, -share))
     else:
-        sentences = _sentences_without_target(result, done, column, value, partly)
-        order = best_first(partly, value)
+        order = best_first(~known, value)
+    found: dict[int, str] = {}
+    for words, mask, figure in wanted:
+        alike = mask & (comparable(figure) == comparable(figure)[mask].min(initial=np.inf))
+        if rows := done[order[alike[order]]].tolist():
+            one_of = f" (one of {len(rows)})" if rows[1:] else ""
+            before = f"{found[rows[0]]}; " if rows[0] in found else ""
+            found[rows[0]] = f"{before}{words}{one_of}"
+    lines = described(result, found)
+    outstanding = {row: f"{found[row]}: {line}." for row, line in zip(found, lines, strict=True)}
+    sentences = [*_verdict(result, meets, judged), *outstanding.values()]
+    if not known.any():
+        sentences.append(f"Every case leaves some of {quantity(column)} undetermined.")
     sentences += [f"Given {text}." for text in _with_cases(result, "given")]
     sentences += _sentences_on_others(result, done)
-    is_good = bool(meets.any()) or not np.isfinite(share).any()
     best = tuple(done[order[:LISTED]].tolist())
-    return SweepAnswer(tuple(sentences), best, int(result.table["cell"][best[0]]), is_good)
+    is_good = bool(meets.any() or not judged.any())
+    case = int(result.table["cell"][best[0]])
+    return SweepAnswer(tuple(sentences), best, case, is_good, outstanding)
+
+
+def _verdict(result: SweepCases, meets: Flags, judged: Flags) -> list[str]:
+    """Return sentences on the numbers of cases that meet the target, which may be an axis."""
+    count, apart = int(judged.sum()), int((~judged).sum())
+    if meets.any():
+        found = int(meets.sum())
+        verdict = f"{found} of {_cases(count)} {_verb(found, 'meet')}"
+    elif count:
+        verdict = f"None of the {count} cases meets" if count > 1 else "The only case does not meet"
+    else:
+        return [NO_TARGET if "U6" in result.definition["record"] else NO_U6]
+    more = f"{_cases(apart)} more {_verb(apart, 'have')} no target to be compared with."
+    return [f"{verdict} the target uncertainty with all lengths.", *[more] * (apart > 0)]
 
 
 def criterion(result: SweepCases) -> str | None:
     """Return the column of the average that cases are judged by; None without one."""
-    for name in CRITERIA:
-        for column in result.table.columns:
-            if column.startswith(f"{name}_average_"):
-                return str(column)
-    return None
+    columns = result.table.columns
+    found = (c for name in CRITERIA for c in columns if c.startswith(f"{name}_average_"))
+    return next(found, None)
 
 
 def quantity(column: str) -> str:
@@ -86,94 +118,6 @@ def best_first(*keys: NDArray[np.generic]) -> Integers:
     """
     *before, value = keys
     return np.lexsort([comparable(value), *reversed(before)])
-
-
-def _sentences_with_target(
-    result: SweepCases,
-    done: Integers,
-    column: str,
-    share: Array,
-    observations: Array,
-    value: Array,
-) -> list[str]:
-    """Return sentences on cases with a target, which may be an axis of the sweep."""
-    meets, judged = share == 1.0, int(np.isfinite(share).sum())
-    apart = len(done) - judged
-    if meets.any():
-        sentences = [
-            f"{meets.sum()} of {_cases(judged)} {_verb(int(meets.sum()), 'meet')} the target"
-            " uncertainty with all lengths.",
-            _cheapest_sentence(result, done, column, np.flatnonzero(meets), observations, value),
-        ]
-    else:
-        best = best_first(-share, value)[0]
-        alike = int((share == share[best]).sum()) - 1
-        tied = f"; {_cases(alike)} more {_verb(alike, 'have')} as many" if alike else ""
-        subject = "The only case does not meet" if judged == 1 else f"None of the {judged}"
-        subject += "" if judged == 1 else " cases meets"
-        sentences = [
-            f"{subject} the target uncertainty with all lengths. The"
-            f" nearest is {result.words(done[best])}, with {percent(float(share[best]))} of"
-            f" the lengths{tied}."
-        ]
-    if apart:
-        sentences.append(
-            f"{_cases(apart)} more {_verb(apart, 'have')} no target to be compared with."
-        )
-    return sentences
-
-
-def _cheapest_sentence(
-    result: SweepCases,
-    done: Integers,
-    column: str,
-    candidates: Integers,
-    observations: Array,
-    value: Array,
-) -> str:
-    """Return a sentence on the case with the fewest observations and, among those, the smallest
-    average.
-    """
-    counted = candidates[np.isfinite(observations[candidates])]
-    if not len(counted):
-        return "Their numbers of observations are not recorded."
-    fewest = counted[observations[counted] == observations[counted].min()]
-    best, same = _first_of_best(value, fewest)
-    name, count = result.words(done[best]), f"{observations[best]:.0f} observations"
-    if len(fewest) == 1:
-        return f"The one with the fewest observations is {name}: {count}."
-    tied = f", as {_verb(same, 'have')} {same} more" if same else ""
-    return (
-        f"The fewest observations are {observations[best]:.0f}, in {len(fewest)} of these cases."
-        f" Among these, {name} has the smallest average of {_with_value(column, value[best])}"
-        f"{tied}."
-    )
-
-
-def _sentences_without_target(
-    result: SweepCases, done: Integers, column: str, value: Array, partly: Flags
-) -> list[str]:
-    """Return sentences on cases without a target."""
-    if WITHIN.partition("_")[0] in result.definition["record"]:
-        sentence = "No case has a target uncertainty for its lengths."
-    else:
-        sentence = "U6 is not recorded, so that no case is compared with a target uncertainty."
-    if partly.all():
-        return [sentence, f"Every case leaves some of {quantity(column)} undetermined."]
-    best, alike = _first_of_best(value, np.flatnonzero(~partly))
-    tied = f"; {_cases(alike)} more {_verb(alike, 'have')} the same" if alike else ""
-    return [
-        sentence,
-        f"The smallest average of {_with_value(column, value[best])}, is that of"
-        f" {result.words(done[best])}{tied}.",
-    ]
-
-
-def _first_of_best(value: Array, places: Integers) -> tuple[int, int]:
-    """Return the first of `places` with the smallest value, and the number of further ones."""
-    values = comparable(value[places])
-    best = best_first(values)[0]
-    return int(places[best]), int((values == values[best]).sum()) - 1
 
 
 def _sentences_on_others(result: SweepCases, done: Integers) -> list[str]:
@@ -218,10 +162,3 @@ def _verb(count: int, verb: str) -> str:
     ('has', 'have', 'meets')
     """
     return verb if count != 1 else "has" if verb == "have" else f"{verb}s"
-
-
-def _with_value(column: str, value: float) -> str:
-    """Return a quantity with its average."""
-    return (
-        f"{quantity(column)}, {number(1e6 * value, 3)} {column_unit(column.split('_average_')[1])}"
-    )

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from ballplate.presentation import shown_unit
+from ballplate.presentation import number, shown_unit, table_rows
 from ballplate.simulator.design import Flags
 from ballplate.simulator.inputs import QUANTITY, exact_number, in_one_line, number_of
 from ballplate.simulator.machines import Array, Integers
@@ -34,6 +34,18 @@ SHOWN = {
     "within_target": "within target, %",
     "spread_ratio": "spread / U",
     "coverage_sigma_given": "covered, %",
+}
+SILENT = ("", "done")
+# Costs and rank, with their headings.
+COSTS = {
+    "positions": "positions",
+    "readings": "readings",
+    "hours": "hours",
+    "observations": "observations",
+    "rank_deficiency": "rank deficiency",
+    "bound_m": "bound, µm",
+    "distance_error_rms_m": "errors of distances, rms, µm",
+    "distance_error_bias_m": "bias, µm",
 }
 IN_TEXT = ("average", "within_target")
 FIGURE = re.compile(rf"(.+?)_({'|'.join(SHOWN)})(?:_(m|rad|m_or_rad|ratio))?")
@@ -89,15 +101,12 @@ class SweepCases:
 
     def figure(self, name: str) -> Array:
         """Return a column of the table (rows,); NaN if it is not recorded."""
-        if name not in self.table:
+        # Axes of earlier stores may have names that are figures now.
+        if name not in self.table or any(
+            name == axis["column"] for axis in self.definition["axes"]
+        ):
             return np.full(len(self.table), math.nan)
         return np.asarray(self.table[name], float)
-
-    def words(self, row: int, axes: Iterable[int] | None = None) -> str:
-        """Return the axes, or some of them, with their values in a row."""
-        chosen = self.chosen[row].tolist()
-        shown = range(len(self.axes)) if axes is None else axes
-        return ", ".join(f"{self.axes[k].name} {self.axes[k].labels[chosen[k]]}" for k in shown)
 
     def headline(self) -> str:
         """Numbers of cases."""
@@ -110,7 +119,7 @@ class SweepCases:
 def columns_of(
     result: SweepCases, rows: Iterable[int], shown: Collection[str] = SHOWN
 ) -> list[tuple[str, list[Any]]]:
-    """Return columns of some rows: axes, rank, the values `shown`, and what these take for
+    """Return columns of some rows: axes, costs, rank, the values `shown`, and what these take for
     granted.
     """
     table, chosen = result.table.iloc[list(rows)], result.chosen[list(rows)]
@@ -120,10 +129,11 @@ def columns_of(
     ]
     if not result.done.all():
         columns.append(("status", table["status"].tolist()))
-    for name in ("observations", "rank_deficiency"):
+    for name, heading in COSTS.items():
         if (result.figure(name) > 0).any():
-            values = [None if math.isnan(v) else int(v) for v in result.figure(name)[table.index]]
-            columns.append((name.replace("_", " "), values))
+            costs = result.figure(name)[table.index].tolist()
+            values = [None if math.isnan(v) else int(v) if v.is_integer() else v for v in costs]
+            columns.append((heading, values))
     for name in table.columns:
         match = FIGURE.fullmatch(name)
         if match is None or match[2] not in shown or match[1].removesuffix("_more") not in WHOLE:
@@ -147,6 +157,29 @@ def columns_of(
     return columns
 
 
+def texts_of(
+    result: SweepCases, rows: Iterable[int], shown: Collection[str]
+) -> tuple[list[str], list[list[str]]]:
+    """Return headings and texts of the cells of `columns_of` some rows."""
+    columns = columns_of(result, rows, shown)
+    texts = [
+        ["" if v is None else number(v) if isinstance(v, float) else str(v) for v in row.values()]
+        for row in table_rows(columns, in_units=True)
+    ]
+    return list(dict(columns)), texts
+
+
+def described(result: SweepCases, rows: Iterable[int]) -> list[str]:
+    """Return a line for each of some cases: its number, its values of the axes, and figures."""
+    heads, texts = texts_of(result, rows, IN_TEXT)
+    names, found = [head.partition(", ") for head in heads], []
+    for cell, row in zip(result.table["cell"].iloc[list(rows)], texts, strict=True):
+        pairs = zip(names, row, strict=True)
+        words = (f"{name} {text} {unit}" for (name, _, unit), text in pairs if text not in SILENT)
+        found.append(f"case {cell}: {'; '.join(map(str.rstrip, words))}")
+    return found
+
+
 def column_unit(suffix: str) -> str:
     """Return the printed unit of a column from the end of its name.
 
@@ -161,11 +194,12 @@ def _axis(stored: dict[str, Any]) -> ShownAxis:
     name, labels = in_one_line(stored["name"]), tuple(map(in_one_line, stored["labels"]))
     if not stored["unit"]:
         return ShownAxis(name, labels, (), "")
+    unit = "" if stored["unit"] == "1" else stored["unit"]
     # The unit as written, if common to all values; otherwise metres or radians.
     matches = [QUANTITY.fullmatch(label.strip()) for label in labels]
-    units = {(match[2] or "").strip() for match in matches if match is not None}
-    if len(units) == 1 and all(matches):
-        numbers = tuple(float(exact_number(match[1])) for match in matches if match is not None)
-        return ShownAxis(name, labels, numbers, units.pop())
-    unit = "" if stored["unit"] == "1" else stored["unit"]
+    parts = [(match[1], (match[2] or "").strip()) for match in matches if match is not None]
+    units = {each for _, each in parts}
+    if len(units) == 1 and len(parts) == len(labels):
+        numbers = tuple(float(exact_number(one)) for one, _ in parts)
+        return ShownAxis(name, labels, numbers, units.pop() or unit)
     return ShownAxis(name, labels, tuple(map(float, stored["values"])), unit)

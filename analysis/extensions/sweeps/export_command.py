@@ -8,7 +8,7 @@ from contextlib import closing
 from functools import partial
 from pathlib import Path
 
-from ballplate.cli import PARQUET, UsageError, add_force, add_output, complain, write
+from ballplate.cli import PARQUET, XLSX, UsageError, add_force, add_output, complain, write
 
 BAD_FILE = 3
 
@@ -28,8 +28,8 @@ def add_options(parser: ArgumentParser) -> None:
         metavar="FILE",
         required=True,
         takes_screen=True,
-        needed=lambda path: PARQUET if path.suffix.lower() == ".parquet" else None,
-        help="table, .csv or .parquet; - for CSV on the screen",
+        needed=lambda path: {".parquet": PARQUET, ".xlsx": XLSX}.get(path.suffix.lower()),
+        help="table, .csv, .xlsx or .parquet; - for CSV on the screen",
     )
     add_force(parser)
 
@@ -56,12 +56,12 @@ def run(options: Namespace) -> int:
     from .store_file import RECOMPUTE
 
     suffix = options.output.suffix.lower()
-    if suffix not in (".csv", ".parquet") and str(options.output) != "-":
-        raise UsageError(f"{options.output} should end in .csv or .parquet")
+    if suffix not in (".csv", ".xlsx", ".parquet") and str(options.output) != "-":
+        raise UsageError(f"{options.output} should end in .csv, .xlsx or .parquet")
     with closing(open_store(options.store, damaged=True)) as store:
         number, defined = chosen_sweep(store, options.sweep)
         stored = results(store, number, len(defined["cells"]))
-        table = frame_of(stored, defined)
+        table = frame_of(stored, defined).drop(columns="drawing", errors="ignore")
     if stored.damaged:
         counted = number_of(len(stored.damaged), "unreadable case")
         first, fault = min(stored.damaged.items())
@@ -74,7 +74,7 @@ def run(options: Namespace) -> int:
     if str(options.output) == "-":
         table.to_csv(sys.stdout, index=False, lineterminator="\n")
     else:
-        to_csv = partial(table.to_csv, lineterminator="\n")
-        to_file = table.to_parquet if suffix == ".parquet" else to_csv
+        forms = {".parquet": table.to_parquet, ".xlsx": table.to_excel}
+        to_file = forms.get(suffix, partial(table.to_csv, lineterminator="\n"))
         write(options, {options.output: lambda path: to_file(path, index=False)})
     return BAD_FILE if stored.damaged else 0

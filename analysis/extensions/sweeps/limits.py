@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any, Literal
+from typing import Literal
 
 from ballplate.simulator.inputs import Node, Problems, Sequence, hint, written
 
+from .axes import check_labels
 from .model import Choice, Limit, Planning, SweepAxis, Unit
 from .sweep_settings import PlanSettings
 from .values import label
-
-# Values of a range of counts.
-MOST_COUNTS = 1000
 
 # Keys of the section, with what they limit and the unit of their axes.
 LIMITS: dict[str, tuple[Literal["seconds", "readings", "positions"], Unit]] = {
@@ -39,28 +36,15 @@ def read_limits(
     axes = []
     for key, (limited, unit) in LIMITS.items():
         stated = getattr(settings, key)
-        node = written(root, "plan", key)
-        values = list(_values(stated)) if stated is not None else []
-        if node is None or not values:
-            if stated is not None:
-                problems.add(("plan", key), "the range has no value, or too many; write 4 to 12")
+        if not isinstance(stated, tuple):
+            common += [] if stated is None else [(limited, stated)]
             continue
-        if isinstance(stated, tuple | str):
-            texts = list(map(label, node.items)) if isinstance(node, Sequence) else map(str, values)
-            choices = tuple(
-                Choice(text, (), value / 3600.0 if unit == "h" else value, limit=(limited, value))
-                for text, value in zip(texts, values, strict=True)
-            )
-            axes.append(SweepAxis(f"{key} limit", choices, unit))
-        else:
-            common.append((limited, values[0]))
+        node = written(root, "plan", key)
+        texts = map(label, node.items) if isinstance(node, Sequence) else map(str, stated)
+        choices = tuple(
+            Choice(text, (), value / 3600.0 if unit == "h" else value, limit=(limited, value))
+            for text, value in zip(texts, stated, strict=True)
+        )
+        axes.append(SweepAxis(f"{key} limit", choices, unit))
+        check_labels(("plan", key), choices, problems)
     return Planning(settings.criterion, settings.seed, tuple(common)), axes
-
-
-def _values(stated: Any) -> Iterator[float]:
-    """Yield the values of a limit; none of a range that falls or is too long."""
-    if isinstance(stated, str):
-        low, high = map(int, stated.split(" to "))
-        yield from range(low, high + 1) if high - low < MOST_COUNTS else ()
-    else:
-        yield from stated if isinstance(stated, tuple) else (stated,)

@@ -41,7 +41,7 @@ from .axes import read_axis
 from .bundle import bundle_of, code_digest
 from .conditions import holds
 from .limits import read_limits
-from .model import Sweep, SweepAxis, Trees
+from .model import Choice, Sweep, SweepAxis, Trees
 from .store_columns import is_reserved
 from .sweep_settings import SweepSettings
 from .values import entry_names
@@ -120,7 +120,13 @@ def _axes(
         for name, axis_settings in settings.axes.items()
     ]
     axes = [*(axis for axis in read_axes if axis is not None), *limits]
-    if not settings.axes and not limits and not problems.messages:
+    if settings.estimator:
+        names = dict.fromkeys(settings.estimator)
+        chosen = tuple(Choice(name, (), estimator=name) for name in names)
+        axes.append(SweepAxis("estimator", chosen, ""))
+        if settings.trials is None:
+            problems.add(("estimator",), "needs data sets; add trials: 100")
+    if not axes and not problems.messages:
         problems.add((), "nothing varies; give axes, or several values of a limit in plan")
     if not problems.messages:
         _check_apart(axes, next(iter(trees.values())), problems)

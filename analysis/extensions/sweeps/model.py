@@ -32,9 +32,9 @@ class Choice:
     """One value of an axis: `changes` are paths with their new nodes, or `variant` replaces the
     variant.
 
-    `kept` is the path of a list with the names of the entries to keep, `limit` one of a plan.
-    `value` is a number in metres, radians, hours or without unit if the axis has such values,
-    otherwise NaN.
+    `kept` is the path of a list with the names of the entries to keep, `limit` one of a plan,
+    `estimator` one that is compared. `value` is a number in metres, radians, hours or without unit
+    if the axis has such values, otherwise NaN.
     """
 
     label: str
@@ -43,6 +43,7 @@ class Choice:
     variant: str | None = None
     kept: tuple[str, tuple[str, ...], Mark] | None = None
     limit: Limit | None = None
+    estimator: str = ""
 
     @property
     def paths(self) -> tuple[str, ...]:
@@ -96,6 +97,15 @@ class Sweep:
     def choices(self, number: int) -> tuple[Choice, ...]:
         """Choices of a cell."""
         return tuple(axis.choices[k] for axis, k in zip(self.axes, self.cells[number], strict=True))
+
+    def estimators(self, number: int) -> tuple[str, ...]:
+        """The estimator of a cell, and the one that shares its data sets with the full one; empty
+        where none is compared.
+        """
+        names = [choice.estimator for axis in self.axes for choice in axis.choices]
+        others = [name for name in names if name not in ("", "full")]
+        own = "".join(choice.estimator for choice in self.choices(number))
+        return (own, own if own != "full" else next(iter(others), "distances")) if own else ()
 
     def label(self, number: int) -> str:
         """Axes of a cell with their values."""

@@ -21,9 +21,9 @@ SUFFIXES = {
 
 
 DESCRIPTION = (
-    "Write the results of a sweep as one HTML page that needs no network: which cases meet the"
-    " target, the best ones, curves along the axes, all cases; with --format text, markdown or"
-    " latex, the table alone. Exit status: 3 if the store is damaged."
+    "Write the results of a sweep as one HTML page that needs no network: the best case and the"
+    " cheapest that meets the target, effects of the axes, all cases, and their designs; with"
+    " --format text, markdown or latex, the table alone. Exit status: 3 if the store is damaged."
 )
 
 

@@ -12,7 +12,11 @@ from .answer import answer
 from .cases import IN_TEXT, MOST_ROWS, SweepCases, columns_of
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     import pandas
+    import xarray
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True, repr=False)
@@ -56,7 +60,7 @@ class SweepResult(SweepCases, Result):
         """Return one mapping per case, with its axes' values and its results; None for missing
         ones.
         """
-        table = self.table.astype(object)
+        table = self.to_frame().astype(object)
         return [
             {str(k): v for k, v in row.items()}
             for row in table.where(table.notna(), None).to_dict("records")
@@ -66,4 +70,30 @@ class SweepResult(SweepCases, Result):
         return columns_of(self, range(len(self.table))), range(len(self.table))
 
     def to_frame(self) -> pandas.DataFrame:
-        return self.table
+        return self.table.drop(columns="drawing", errors="ignore")
+
+    def to_xarray(self) -> xarray.Dataset:
+        """The table with a dimension for each axis, in metres, radians or texts as in `to_frame`;
+        NaN where a case is missing.
+
+        :raises ImportError: xarray is missing.
+        """
+        axes = self.definition["axes"]
+        every = {axis["column"]: axis["values" if axis["unit"] else "labels"] for axis in axes}
+        try:
+            return self.to_frame().set_index(list(every)).to_xarray().reindex(every)
+        except ImportError as error:
+            text = "this needs xarray; install it with: python -m pip install 'ballplate[xarray]'"
+            raise ImportError(text, name="xarray") from error
+
+    def plot(self, path: str | Path | None = None) -> Figure:
+        """Draw the average that cases are judged by against hours, or else along each axis.
+
+        With a path, which ends in .svg, .png or .pdf, the picture is written as well.
+
+        :raises ImportError: matplotlib is missing.
+        :raises ValueError: the path has another suffix, or no averages can be compared.
+        """
+        from .sweep_plot import draw_sweep
+
+        return draw_sweep(self, path)

@@ -97,17 +97,19 @@ def compute_sweep(
     fail_fast: bool = False,
     report: Report = unreported,
 ) -> Summary:
-    """Compute the remaining cells of sweep `number` of a store, then what the figures of the best
-    one take for granted.
+    """Compute the remaining cells of sweep `number` of a store, then what the figures of those that
+    its answer names take for granted.
 
     :raises StoreError: the store cannot be written, or was moved.
     :raises ChangedError: files of the sweep have changed meanwhile.
     """
     with runner as working:
         summary = run_sweep(store, number, sweep, working, retry_failed, fail_fast, report)
-        found = None if summary.left else answer(stored_result(store, number))
-        if found is not None:
-            _assess(store, keys(store, number)[found.case], working, found.case)
+        result = stored_result(store, number)
+        found = None if summary.left else answer(result)
+        named = [] if found is None else [found.case, *result.table["cell"][[*found.outstanding]]]
+        for cell in dict.fromkeys(map(int, named)):
+            _assess(store, keys(store, number)[cell], working, cell)
     ensure_in_place(store)
     return summary
 

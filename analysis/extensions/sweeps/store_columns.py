@@ -31,6 +31,9 @@ NAMES = (
     "smallest_singular_value_per_um",
     "gap",
     "trials",
+    "distance_error_rms_m",
+    "distance_error_bias_m",
+    "distance_error_rms_m_standard_error",
     "not_converged",
     "degrees_of_freedom",
 )

@@ -2,33 +2,56 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from functools import partial
 from pathlib import PurePosixPath
 
 from ballplate.extensions.pages.interface import (
     Html,
     Page,
     PageSection,
+    chart_svg,
     element,
     facts_list,
-    figures,
+    figure,
     joined,
     note,
     sentence,
     table,
     written,
 )
-from ballplate.presentation import number, table_rows
 
-from .answer import SweepAnswer, answer, criterion
-from .cases import IN_TEXT, MOST_ROWS, SHOWN, SweepCases, columns_of
-from .curves import curves
+from .answer import answer, criterion
+from .axis_effects import effects, frontier
+from .cases import IN_TEXT, MOST_ROWS, SHOWN, SweepCases, described, texts_of
+from .curves import charts
+from .design_drawings import drawings, drawn
+from .temporary import TEMPORARY
 
 # Values of an axis in the list of facts.
 LISTED = 12
 
-# Temporary sweep file of the studio.
-MADE_IN_STUDIO = ".ballplate-sweep.yaml"
+CAPTIONS = {
+    "best": "The best cases",
+    "frontier": "Cases of which no other has less uncertainty in as few hours",
+    "cases": "Cases by number",
+}
+COSTS = note(
+    "Observations are readings and certified values. Assumptions are assessed for the first case of"
+    " this table and those above it only, when all cases are done."
+)
+EFFECTS = "Largest average over smallest along each axis, for each combination of the others"
+HEADS = (
+    "axis",
+    "median",
+    "least",
+    "most",
+    "smallest at, in combinations",
+    "combinations with two or more values",
+    "with all values",
+)
+
+IN_WORDS = ("status", "given", "unspanned")
 
 FOOT = "Standard uncertainties throughout; ballplate sweep --export has all figures and digits."
 
@@ -36,64 +59,77 @@ FOOT = "Standard uncertainties throughout; ballplate sweep --export has all figu
 def sweep_page(result: SweepCases) -> str:
     """Return the page of a sweep."""
     found, judged = answer(result), criterion(result)
-    charts = [] if found is None or judged is None else curves(result, judged)
-    rows = range(min(len(result.table), MOST_ROWS))
+    value = result.figure(judged or "")
+    best = frontier(result, value)[:MOST_ROWS]
+    first = [] if found is None else [*found.outstanding, *found.best, *best]
+    rows = sorted(list(dict.fromkeys([*first, *range(len(result.table))]))[:MOST_ROWS])
+    designs = drawings(result, rows)
+    cells = result.table["cell"]
+    targets = {row: f"case-{cells[row]}" for group in designs.values() for row in group}
+    listed = partial(_table, result, targets)
     left_out = len(result.table) - len(rows)
     more = note(f"Cases not shown here: {left_out}.") if left_out else ""
-    cases = joined([_table("cases", "Cases", result, rows), more]) if rows else Html()
-    listed = element("ul", *(element("li", text) for text in result.shortcomings))
-    sections = [
-        PageSection("answer", "Answer", Html() if found is None else _answer(result, found)),
-        PageSection("axes", "Along the axes", figures(*charts) if charts else Html()),
-        PageSection("cases", "Cases", cases),
-        PageSection("notes", "Failures and notes", listed if result.shortcomings else Html()),
+    notes = element("ul", *(element("li", text) for text in result.shortcomings))
+    sections, drawn_cases = [], []
+    if found is not None and judged is not None:
+        verdict, *further = found.sentences
+        kind = "verdict" if found.is_good else "verdict bad"
+        others = (sentence(each) for each in further if each not in found.outstanding.values())
+        pictures = (
+            element("div", sentence(line), *map(drawn, drawings(result, [row])))
+            for row, line in found.outstanding.items()
+        )
+        shown = element("div", *pictures, class_="picked"), *others, listed("best", found.best)
+        answered = joined([element("p", verdict, class_=kind), *shown, COSTS])
+        drawn_charts = charts(result, judged, best, targets)
+        figures = [figure(chart.words, chart_svg(chart)) for chart in drawn_charts]
+        costs = [figures.pop(0), listed("frontier", best)] if best else []
+        axes = [table("effects", EFFECTS, HEADS, effects(result, value), (0, 4)), *figures]
+        for text, group in designs.items():
+            lines = zip(group, described(result, group), strict=True)
+            texts = (element("p", line, id=targets[k]) for k, line in lines)
+            drawn_cases.append(element("div", drawn(text, *texts), class_="design"))
+        sections = [
+            PageSection("answer", "Answer", answered),
+            PageSection("frontier", "Uncertainty against hours", joined(costs)),
+            PageSection("axes", "Effect of each axis", joined(axes if figures else [])),
+        ]
+    if rows:
+        cases = joined([listed("cases", rows, SHOWN), more])
+        sections.append(PageSection("cases", "Cases", cases))
+    sections += [
+        PageSection("designs", "Designs", joined(drawn_cases)),
+        PageSection("notes", "Failures and notes", notes if result.shortcomings else Html()),
         PageSection("swept", "What was swept", facts_list(_facts(result))),
     ]
     return written(Page(result.title, sentence(f"{result.headline()}."), sections, FOOT))
 
 
-def _answer(result: SweepCases, found: SweepAnswer) -> Html:
-    first, *further = found.sentences
-    verdict = element("p", first, class_="verdict" if found.is_good else "verdict bad")
-    best = _table("best", "The best cases", result, found.best, IN_TEXT)
-    costs = note("Observations are readings and certified values; other costs are not included.")
-    return joined([verdict, *map(sentence, further), best, costs])
-
-
 def _table(
-    name: str,
-    caption: str,
     result: SweepCases,
+    targets: Mapping[int, str],
+    name: str,
     rows: Sequence[int],
-    shown: Collection[str] = SHOWN,
+    shown: Collection[str] = IN_TEXT,
 ) -> Html:
-    columns = columns_of(result, rows, shown)
-    texts = [
-        ["" if v is None else number(v) if isinstance(v, float) else str(v) for v in row.values()]
-        for row in table_rows(columns, in_units=True)
-    ]
-    words = [k for k, (_, values) in enumerate(columns) if isinstance(values[0], str)]
-    heads = [heading for heading, _ in columns]
-    return table(name, caption, heads, texts, words, is_long=len(texts) > LISTED)
-
-
-def _source(path: str) -> tuple[str, str]:
-    """Return the source of a sweep, from its path in the store.
-
-    >>> _source("plates/sizes.yaml"), _source("plates/.ballplate-sweep.yaml")
-    (('Sweep file', 'plates/sizes.yaml'), ('Sweep', 'made in the studio'))
-    """
-    # Readers cannot look up a temporary file.
-    if PurePosixPath(path).name == MADE_IN_STUDIO:
-        return "Sweep", "made in the studio"
-    return "Sweep file", path
+    """Return a table of cases that leads to their designs."""
+    heads, texts = texts_of(result, rows, shown)
+    for row, cells in zip(rows, texts, strict=True):
+        case = str(result.table["cell"][row])
+        cells.insert(0, element("a", case, href=f"#{targets[row]}") if row in targets else case)
+    words = [k for k, head in enumerate(heads, 1) if k <= len(result.axes) or head in IN_WORDS]
+    caption = CAPTIONS[name]
+    return table(name, caption, ["case", *heads], texts, [0, *words], is_long=len(texts) > LISTED)
 
 
 def _facts(result: SweepCases) -> list[tuple[str, str]]:
     stored = result.definition
     base = stored["experiment"].get("title", "") if isinstance(stored["experiment"], dict) else ""
+    source = stored["source"]
+    # Readers cannot look up a temporary file.
+    is_made = PurePosixPath(source).name == TEMPORARY
     facts = [
-        _source(stored["source"]),
+        ("Sweep", "in Python or the studio") if is_made else ("Sweep file", source),
         ("Experiment", f"{stored['base']}: {base}" if base else stored["base"]),
     ]
     for axis in result.axes:

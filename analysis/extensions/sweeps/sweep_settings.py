@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
+from ballplate.results import COMPARED
 from ballplate.simulator.experiment import Line, Seed
 from ballplate.simulator.geometry import Name
 from ballplate.simulator.inputs import Duration, Forms, NonEmpty, Settings, Text
 from ballplate.uncertainty import QUANTITIES, RECORDED, RECORDED_IF_TOLD
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 if TYPE_CHECKING:
     Quantity = str
+    Estimator = str
 else:
     Quantity = Literal[tuple(symbol for symbol in QUANTITIES if " " not in symbol)]
+    Estimator = Literal["full", *COMPARED]
 
 KEPT = f"{RECORDED[0]} to {RECORDED[-1]}"
 MORE = ", ".join(RECORDED_IF_TOLD)
@@ -27,6 +31,8 @@ VariantNames = NonEmpty[Name]
 
 # Synthetic data sets of a cell.
 MOST_TRIALS = 10_000_000
+# Values of a range of counts.
+MOST_COUNTS = 1000
 
 
 class SubsetSettings(Settings):
@@ -88,8 +94,22 @@ Condition = Forms[Scalar, NonEmpty[Any], BoundsSettings]
 
 
 Count = Annotated[int, Field(ge=1)]
-CountRange = Annotated[str, Field(pattern=r"^ *[1-9][0-9]{0,8} +to +[1-9][0-9]{0,8} *$")]
-Counts = Forms[Count | CountRange, NonEmpty[Count], NonEmpty[Count]]
+
+
+def _range(text: str) -> tuple[int, ...]:
+    """Return the counts of a range.
+
+    >>> _range("4 to 6")
+    (4, 5, 6)
+    """
+    match = re.fullmatch(r" *([1-9][0-9]{0,8}) +to +([1-9][0-9]{0,8}) *", text)
+    low, high = map(int, match.groups()) if match else (1, 0)
+    if not 0 <= high - low < MOST_COUNTS:
+        raise ValueError("expected a number, a list, or a range from low to high such as 4 to 12")
+    return tuple(range(low, high + 1))
+
+
+Counts = Forms[Count | Annotated[str, AfterValidator(_range)], NonEmpty[Count], NonEmpty[Count]]
 Hours = Annotated[Duration, Field(gt=0)]
 
 
@@ -128,6 +148,13 @@ class SweepSettings(Settings):
     )
     plan: PlanSettings | None = Field(
         None, description="choose the positions of each case from the pool of the base"
+    )
+    estimator: NonEmpty[Estimator] = Field(
+        (),
+        description=(
+            "estimators, an axis of this name: of each the errors of corrected distances are"
+            " recorded, over as many data sets as trials"
+        ),
     )
     skip: tuple[Annotated[dict[Name, Condition], Field(min_length=1)], ...] = Field(
         (),

@@ -87,7 +87,9 @@ def blocks_of(sweep: Sweep) -> int:
     """Return the number of replicate blocks with tasks of their own; 0 if one task computes all, as
     where each would choose its positions anew.
     """
-    if sweep.trials is None or sweep.trials <= BLOCK or sweep.planning is not None:
+    if sweep.trials is None or sweep.trials <= BLOCK:
+        return 0
+    if sweep.planning is not None or any(axis.choices[0].estimator for axis in sweep.axes):
         return 0
     return -(-sweep.trials // BLOCK)
 
@@ -108,7 +110,7 @@ def _computed(sweep: Sweep, task: CellTask) -> CellResult:
         return CellResult(number, block, invalid_key(sweep, number), "failed", _reason(error))
     request = request_of(sweep, number)
     cost = request or spent_as_drawn(experiment)
-    key = key_of(sweep, experiment, cost)
+    key = key_of(sweep, experiment, cost, sweep.estimators(number))
     seed = seed_of(sweep, key)
     if block == KEY_ONLY:
         return CellResult(number, block, key, "done")
@@ -161,7 +163,9 @@ def _whole(
             details["unspanned"] = lost
     figures |= plan_figures(planned, sweep.record)
     details |= {"given": list(dict.fromkeys(given)), "drawing": drawing(experiment)}
-    if sweep.trials is not None:
+    if estimators := sweep.estimators(task.number):
+        figures |= distance_errors(sweep, experiment, *estimators)
+    elif sweep.trials is not None:
         if task.total is not None:
             replicates = Trials(seed, combined(experiment, task.total))
         else:
@@ -185,7 +189,7 @@ def _given(qualifications: Iterable[Qualification]) -> list[str]:
     given = [each.given for each in found if each.kind != "assumption"]
     # Too slow for each cell.
     assumed = [each.given for each in found if each.kind == "assumption"]
-    return given + [f"{' and '.join(assumed)} (assessed for the best case only)"] * bool(assumed)
+    return given + [f"{' and '.join(assumed)} (assessed for the first cases only)"] * bool(assumed)
 
 
 def lost(sweep: Sweep, task: CellTask) -> CellResult:
@@ -202,12 +206,12 @@ def lost(sweep: Sweep, task: CellTask) -> CellResult:
     )
 
 
-def key_of(sweep: Sweep, experiment: Experiment, cost: Cost) -> str:
+def key_of(sweep: Sweep, experiment: Experiment, cost: Cost, estimators: tuple[str, ...]) -> str:
     """Return the key of a cell: of its experiment, its cost or the request for its plan, the
-    recorded quantities, and any data sets.
+    recorded quantities, and any data sets with the estimators that are compared.
     """
     trials = None if sweep.trials is None else (sweep.trials, sweep.seed)
-    return fingerprint(experiment, cost, trials, sorted(set(sweep.record)), sweep.code)
+    return fingerprint(experiment, cost, trials, estimators, sorted(set(sweep.record)), sweep.code)
 
 
 def invalid_key(sweep: Sweep, number: int) -> str:
@@ -246,6 +250,22 @@ def plan_figures(planned: Prediction, record: tuple[str, ...]) -> dict[str, floa
         figures[f"{name}_count"] = float(quantity.count)
         if quantity.within_target is not None:
             figures[f"{name}_within_target"] = quantity.within_target
+    return figures
+
+
+def distance_errors(
+    sweep: Sweep, experiment: Experiment, estimator: str, compared: Any
+) -> dict[str, float]:
+    """Return errors of distances that an estimator corrects, over the data sets of a sweep that
+    `compared` and the full estimator converge on; none if distances are undetermined.
+    """
+    from ballplate.extensions.estimators import compare_estimators
+
+    found = compare_estimators(experiment, sweep.trials or 2, compared, seed=sweep.seed)
+    figures = {"trials": float(found.trials), "not_converged": float(len(found.failed))}
+    if errors := found.of_truth.get(estimator):
+        figures |= {"distance_error_rms_m": errors.rms, "distance_error_bias_m": errors.bias}
+        figures["distance_error_rms_m_standard_error"] = errors.rms_error
     return figures
 
 

@@ -9,8 +9,8 @@ import ballplate as bp
 import numpy as np
 import pytest
 from ballplate.cli import main
+from ballplate.extensions.drafting import checked_draft
 from ballplate.extensions.drafting.data_sheet import data_sheet
-from ballplate.extensions.drafting.draft import draft
 from ballplate.extensions.planning.constraints import with_chosen
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.machines.arrangement import ARRANGEMENTS
@@ -24,7 +24,7 @@ from tests.extensions.drafting.sheets import BRIDGE, FLAT, SHEETS, furthest, opt
 def drafted(sheet: dict[str, str], **changed: str) -> str:
     """The text of a file."""
     stated = sheet | changed
-    return draft(data_sheet(stated), stated, "next")
+    return checked_draft.drafted(Path("drafted.yaml"), data_sheet(stated), stated, "next")
 
 
 @pytest.mark.parametrize(

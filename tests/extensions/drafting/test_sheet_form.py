@@ -65,7 +65,8 @@ def test_the_same_answers_give_the_file_of_init(
     assert draft["text"].encode() == Path("m.yaml").read_bytes()
     assert set(draft["words"]) < set(READERS) and "40 mm long" in draft["words"]["tips"]
     roles = [shape["role"] for shape in draft["shapes"]]
-    assert roles.count("plate") == 6 and roles.count("volume") == 6
+    assert roles.count("plate") == draft["text"].count("plane: ") >= 6
+    assert roles.count("volume") == 6
 
 
 @pytest.mark.parametrize(

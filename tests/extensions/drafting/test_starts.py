@@ -13,6 +13,7 @@ from ballplate.extensions.drafting.machine_tables import table
 from ballplate.extensions.drafting.places import places_of, tips_of
 from ballplate.extensions.drafting.shapes import VIEW, machine_shapes
 from ballplate.extensions.drafting.sheet_values import Plate, StatedTips
+from ballplate.extensions.planning import spent_as_drawn
 
 from tests.extensions.drafting.sheets import BRIDGE, FLAT, options
 
@@ -29,10 +30,30 @@ PROBES = {"x": ["right", "left"], "y": ["back", "front"], "z": ["down"]}
 IN_PLANE = {"x": "yz", "y": "zx", "z": "xy"}
 
 
+@pytest.mark.parametrize(("hours", "count"), [("1", 6), ("5.7", 6), ("6", 9), ("8", 12)])
+def test_the_hours_decide_how_many_positions_a_file_begins_with(
+    hours: str, count: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Nine take 5.75 h with 25 balls, twelve 7.33 h; a head begins as a star does."""
+    sheet = BRIDGE | {"plate": "5 x 5, 420 mm", "hours": hours}
+    for tips in ("star", "head"):
+        path = tmp_path / f"{tips}.yaml"
+        assert main(["init", str(path), *options(sheet | {"tips": tips})]) == (hours == "1") * 2
+        if path.exists():
+            experiment = bp.load(path)
+            assert len(experiment.positions) == count
+            assert spent_as_drawn(experiment).seconds <= 3600.0 * float(hours)
+            assert f"# {count} positions of a simple strategy" in path.read_text(encoding="utf-8")
+            assert bp.check(experiment).verdict.deficiency == 0
+    assert (hours == "1") == ("is too short" in capsys.readouterr().err)
+
+
 @pytest.mark.long
-@pytest.mark.parametrize("name", SHAPES)
-def test_the_start_is_near_a_plan_of_its_size(name: str) -> None:
-    drafted = bp.design(**BRIDGE | SHAPES[name])
+@pytest.mark.parametrize(
+    ("name", "hours"), [*((name, "5") for name in SHAPES), ("small", "6"), ("cube", "8")]
+)
+def test_the_start_is_near_a_plan_of_its_size(name: str, hours: str) -> None:
+    drafted = bp.design(**BRIDGE | SHAPES[name], hours=hours)
     candidates = [
         {
             "name": f"grid {plane} {turn}",
@@ -46,8 +67,8 @@ def test_the_start_is_near_a_plan_of_its_size(name: str) -> None:
         for turn in (0, 1)
     ]
     pool = {"candidates": candidates, "limits": {"edge": "0 mm"}}
-    planned = bp.plan(drafted.with_(pool=pool), positions=6)
-    assert len(drafted.positions) == 6
+    planned = bp.plan(drafted.with_(pool=pool), positions=len(drafted.positions))
+    assert len(drafted.positions) == {"5": 6, "6": 9, "8": 12}[hours]
     assert bp.run(drafted).quantities["U6"].average < 1.15 * planned.value
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from typing import Any
-from unittest.mock import Mock
 
 import ballplate as bp
 import numpy as np
@@ -49,7 +48,7 @@ def test_marks_of_a_chart_stand_where_its_numbers_say(x: Any, y: Any, ends: Any,
     assert '<text x="195.0" y="164.0" text-anchor="middle">x, mm<' in chart_svg(chart)
 
 
-@pytest.mark.parametrize(("count", "shown"), [(2, "low"), (3, "many letter…"), (60, "")])
+@pytest.mark.parametrize(("count", "shown"), [(2, "low"), (3, "many letters or …"), (60, "")])
 def test_names_along_a_chart_stand_below_their_places_apart(count: int, shown: str) -> None:
     """In full or by their first letters, otherwise some of their numbers."""
     places = tuple((k, "low" if count == 2 else "many letters or more") for k in range(count))
@@ -95,10 +94,9 @@ BOXES = ([0.0, 0.0, 0.0], [0.9, 1.2, 0.7]), ([-0.5, 0.1, -0.2], [0.4, 0.6, 0.3])
 @pytest.mark.parametrize(("lower", "upper"), [*BOXES, ([0.1, -0.2], [0.5, 0.3])])
 def test_axes_of_the_volume_are_told_outside_of_it(lower: Any, upper: Any) -> None:
     """Ticks leave the edge at their number at right angles on paper, names are beyond the ends."""
-    d, size, design = len(lower), np.subtract(upper, lower).max(), Mock()
+    d, size = len(lower), np.subtract(upper, lower).max()
     lower, upper = np.array(lower), np.array(upper)
-    design.machine.volume.lower, design.machine.volume.upper = lower, upper
-    *edges, strokes, origin, labels = volume_layers(design)
+    *edges, strokes, origin, labels = volume_layers(lower, upper)
     view, _ = projection(d)
     corners = hull(np.concatenate([layer.points for layer in edges]) @ view.T)
     sides = np.roll(corners, -1, axis=0) - corners

@@ -35,6 +35,32 @@ def small_sweep(folder: Path, count: int, more: str = "") -> Path:
     return path
 
 
+# Four plans of ten candidates each, all of whose choices are tried.
+POOL = """\
+pool:
+  candidates:
+    - {planes: [x], levels: [20 %], corners: {y: [low, high], z: [low]}, probes: [[right, left]]}
+    - {planes: [y], levels: [20 %], corners: {x: [low, high], z: [low]}, probes: [[back, front]]}
+"""
+PLANNED = """\
+title: plans of small pools
+base: base.yaml
+plan: {criterion: U6, hours: [4 h, 300 min], seed: 3}
+axes:
+  size: {paths: ["artefacts.plate.size[0]", "artefacts.plate.size[1]"], values: [600 mm, 750 mm]}
+record: [U6]
+"""
+
+
+def planned_sweep(folder: Path) -> Path:
+    text = (ROOT / "designs" / "quickstart.yaml").read_text(encoding="utf-8")
+    text = text.replace("random: 200", "random: 20") + POOL
+    (folder / "base.yaml").write_text(text, encoding="utf-8")
+    path = folder / "plans.yaml"
+    path.write_text(PLANNED, encoding="utf-8")
+    return path
+
+
 def command(*arguments: object) -> list[str]:
     return [sys.executable, "-m", "ballplate", *map(str, arguments)]
 

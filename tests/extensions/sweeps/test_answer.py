@@ -3,91 +3,22 @@
 from __future__ import annotations
 
 import csv
-import itertools
 import re
 from pathlib import Path
 
 import numpy as np
 from ballplate.cli import main
 from ballplate.extensions.sweeps.answer import answer
-from ballplate.extensions.sweeps.curves import lines_along
 from ballplate.extensions.sweeps.result import SweepResult
 
 from tests.extensions.sweeps import wording
 from tests.extensions.sweeps.stores import axis, done, failed, made_up_result
-
-SIZES, BALLS, MODELS = (300.0, 400.0, 500.0), (4.0, 6.0), ("metric", "kinematic")
-
-
-def average(size: float, balls: float, model: str) -> float:
-    """An average uncertainty in metres: larger plates and more balls have less."""
-    return 1e-6 * (300.0 / size) ** 2 * (4.0 / balls) * (2.0 if model == "kinematic" else 1.0)
-
-
-def sweep(folder: Path, limit: float = 0.5e-6, open_: tuple[int, ...] = ()) -> SweepResult:
-    """A sweep over size, balls and model of which settings below a limit meet the target."""
-    listed = [
-        axis("size", [f"{one:.0f} mm" for one in SIZES], [one / 1e3 for one in SIZES], "m"),
-        axis("balls", [f"{one:.0f}" for one in BALLS], list(BALLS), "1"),
-        axis("model", list(MODELS), [], ""),
-    ]
-
-    def rows():
-        for k, setting in enumerate(itertools.product(SIZES, BALLS, MODELS)):
-            is_open = k in open_
-            size = np.nan if is_open else average(*setting)
-            yield done(
-                k,
-                {
-                    "U6_average_m": size,
-                    "U6_maximum_m": 2 * size,
-                    "U6_undetermined": 7.0 if is_open else 0.0,
-                    "U6_within_target": 0.4 if is_open or size > limit else 1.0,
-                    "rank_deficiency": 1.0 if is_open else 0.0,
-                    "observations": 100.0 * setting[1],
-                    "as_expected": 1.0,
-                },
-            )
-
-    return made_up_result(folder / "made-up.sqlite", "made up", listed, rows())
 
 
 def labels(result: SweepResult, row: int) -> tuple[str, ...]:
     """The axes' values in a row."""
     chosen = result.chosen[row].tolist()
     return tuple(axis.labels[k] for axis, k in zip(result.axes, chosen, strict=True))
-
-
-def test_lines_are_of_cases_that_differ_in_one_axis(tmp_path: Path) -> None:
-    result = sweep(tmp_path, open_=(0,))
-    value = result.figure("U6_average_m")
-    sizes = result.figure("size_m")
-    lines, note = lines_along(result, 0, sizes, value)
-    assert note == "" and [label for label, _ in lines] == [
-        f"balls {balls:.0f}, model {model}" for balls in BALLS for model in MODELS
-    ]
-    for label, rows in lines:
-        balls, model = (part.split()[1] for part in label.split(", "))
-        expected = [average(1e3 * size, float(balls), model) for size in sizes[rows]]
-        np.testing.assert_allclose(value[rows], expected, rtol=1e-12)
-    # What the first case leaves undetermined is no point.
-    assert [sizes[rows].tolist() for _, rows in lines] == [[0.4, 0.5]] + 3 * [[0.3, 0.4, 0.5]]
-
-
-def test_of_many_lines_those_with_the_smallest_averages_are_drawn(tmp_path: Path) -> None:
-    count = 9
-    axes = [
-        axis("a", ["1", "2"], [1.0, 2.0], "1"),
-        axis("b", [str(k) for k in range(count)], [float(k) for k in range(count)], "1"),
-    ]
-    rows = [done(k, {"U6_average_m": 1e-6 * (1 + k % count)}) for k in range(2 * count)]
-    result = made_up_result(tmp_path / "many.sqlite", "many", axes, rows)
-    lines, note = lines_along(result, 0, result.figure("a"), result.figure("U6_average_m"))
-    assert [label for label, _ in lines] == [f"b {k}" for k in range(6)]
-    assert note == " Of 9 combinations of the other axes, the 6 with the smallest."
-    # Against b, each line is of one value of a.
-    (one, two), note = lines_along(result, 1, result.figure("b"), result.figure("U6_average_m"))
-    assert note == "" and (one[0], two[0]) == ("a 1", "a 2") and len(one[1]) == count
 
 
 def random_sweep(path: Path, seed: int) -> SweepResult:
@@ -187,20 +118,14 @@ def _assert_first(
         assert text.startswith("No case has a target")
     elif not meeting:
         assert text.startswith(("None of the", wording.THE_ONLY_SETTING_DOES_NOT_MEET))
-        assert wording.OF_THE_LENGTHS in text
+        assert wording.WITHIN_TARGET in text
     else:
         assert re.match(rf"{len(meeting)} of {len(shares)} cases? meets? the target", text)
         fewest = min(float(row["observations"]) for row in meeting)
         cheapest = [row for row in meeting if float(row["observations"]) == fewest]
         best = min(float(row[average]) for row in cheapest)
-        if len(cheapest) == 1:
-            assert (
-                f": {fewest:.0f} observations" in text and wording.THE_ONE_WITH_THE_FEWEST in text
-            )
-        else:
-            assert f"observations are {fewest:.0f}, in {len(cheapest)} of these cases" in text
-            tied = sum(float(row[average]) == best for row in cheapest) - 1
-            assert f"{1e6 * best:.2f} µm" in text and (f"{tied} more." in text) == (tied > 0)
+        (said,) = re.findall(rf"{wording.FEWEST}([^:]*): .*?; observations (\d+);", text)
+        assert said == (_one_of(len(cheapest)), f"{fewest:.0f}")
         chosen = [row for row in cheapest if float(row[average]) == best]
         assert first in [_labels(row) for row in chosen]
     if shares:
@@ -209,10 +134,15 @@ def _assert_first(
     elif known:
         best = min(float(row[average]) for row in known)
         tied = sum(float(row[average]) == best for row in known) - 1
-        assert f"{symbol}, {1e6 * best:.2f} µm" in text and ("the same." in text) == (tied > 0)
+        said = f"Smallest average of {symbol}{_one_of(tied + 1)}: case"
+        assert said in text and f"{symbol} average {1e6 * best:.3f} µm" in text
         assert first in [_labels(row) for row in known if float(row[average]) == best]
     else:
         assert f"Every case leaves some of {symbol} undetermined" in text
+
+
+def _one_of(count: int) -> str:
+    return f" (one of {count})" if count > 1 else ""
 
 
 def _labels(row: dict[str, str]) -> tuple[str, ...]:

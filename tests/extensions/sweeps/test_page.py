@@ -87,10 +87,11 @@ def test_figures_of_the_page_are_the_store_s(plate_sizes: Path, plate_sizes_page
         for symbol in ("U1", "U4", "U5", "U6"):
             shown = [row[heads.index(f"{symbol} {statistic}, µm")] for row in rows]
             assert shown == [number(1e6 * one) for one in frame[f"{symbol}_{statistic}_m"]]
-    # One chart along each axis.
-    assert len(found.of("figure")) == 2
-    best = [row[:2] for row in cells_of(text, "best")[1:]]
-    assert best[0] == ["750 mm", "4"] and len(best) == 8
+    # One chart against hours, one along each axis, a dot for each case.
+    drawings = [one for one in found.of("figure") if "class" in one]
+    assert len(found.of("figure")) == 3 + len(drawings) and text.count("dots noted") == 36
+    best = [row[:3] for row in cells_of(text, "best")[1:]]
+    assert best[0] == ['<a href="#case-9">9</a>', "750 mm", "4"] and len(best) == 8
 
 
 def test_variants_with_deficient_designs(tmp_path: Path) -> None:
@@ -158,8 +159,10 @@ def test_a_large_sweep_makes_a_small_page(tmp_path: Path) -> None:
             yield done(k, {**{name: size for name in names}, "rank_deficiency": 0.0})
 
     text = made_up_result(tmp_path / "large.sqlite", "large", axes, rows()).page_text()
-    assert len(text) < 200_000
+    # Every case is a dot, and most have no text.
+    assert len(text) < 500_000
     found = assert_accessible(text)
     assert wording.CASES_NOT_SHOWN in found.texts["p"]
     assert len(cells_of(text, "cases")) == 201
-    assert any("the 6 with the smallest" in one for one in found.texts["figcaption"])
+    assert all(wording.FORTY_LINES in one for one in found.texts["figcaption"])
+    assert not found.texts.get("title")[1:]

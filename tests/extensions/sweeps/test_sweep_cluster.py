@@ -24,7 +24,15 @@ from ballplate.extensions.sweeps.cluster import ClusterError, OtherVersionError,
 from ballplate.extensions.sweeps.task import CellTask
 
 from tests.extensions.sweeps import wording
-from tests.extensions.sweeps.support import ROOT, assert_same, command, rows, small_sweep, stored
+from tests.extensions.sweeps.support import (
+    ROOT,
+    assert_same,
+    command,
+    planned_sweep,
+    rows,
+    small_sweep,
+    stored,
+)
 
 Start = Callable[..., subprocess.Popen[bytes]]
 
@@ -222,6 +230,17 @@ def test_a_cluster_gives_the_same_rows_even_if_a_worker_dies(
     # What is unpacked is in the folders of the workers, which dask deletes whatever ends them.
     assert not list(temporary.glob("ballplate-*"))
     ended_at_once(workers)
+
+
+@pytest.mark.slow
+def test_planned_cases_on_a_cluster(
+    tmp_path: Path, scheduler: tuple[str, subprocess.Popen[bytes]], start: Start
+) -> None:
+    worker, path, alone = start("-c", SERVE, scheduler[0]), planned_sweep(tmp_path), "alone.sqlite"
+    assert main(["sweep", str(path), "--scheduler", scheduler[0]]) == 0
+    assert main(["sweep", str(path), "--store", str(tmp_path / alone), "--workers", "1"]) == 0
+    assert_same(rows(tmp_path / "plans.sqlite"), rows(tmp_path / alone))
+    ended_at_once(worker)
 
 
 def test_no_scheduler(

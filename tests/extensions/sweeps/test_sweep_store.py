@@ -99,21 +99,22 @@ def test_a_store_of_an_earlier_format_is_read_but_not_continued(
     assert store.read_bytes() == before
 
 
-def test_assumptions_are_assessed_for_the_best_case(tmp_path: Path) -> None:
+def test_assumptions_are_assessed_for_the_cases_that_the_answer_names(tmp_path: Path) -> None:
     path, store = small_sweep(tmp_path, 2, "record: [U6]\n"), tmp_path / "small.sqlite"
     text = (tmp_path / "quickstart.yaml").read_text(encoding="utf-8")
     assumed = "assumptions: {temperature: 5 K}\n"
     (tmp_path / "quickstart.yaml").write_text(text + assumed, encoding="utf-8")
     assert sweep(path) == 1
     table = rows(store)
-    best = answer(bp.stored(store)).case
-    given = [
-        one.given
-        for one in predict(experiment_of(load_sweep(path), best)).qualifications
-        if one.kind == "assumption"
-    ]
-    assert given
-    expected = {best: f"{' and '.join(given)} (assessed for the best case only)"}
+    expected = {}
+    for case in answer(bp.stored(store)).outstanding:
+        given = [
+            one.given
+            for one in predict(experiment_of(load_sweep(path), case)).qualifications
+            if one.kind == "assumption"
+        ]
+        assert given
+        expected[case] = f"{' and '.join(given)} (assessed for the first cases only)"
     done = table["status"] == "done"
     others = done.map({True: "exact probe offsets", False: ""})
     assert table["given"].tolist() == [expected.get(k, text) for k, text in enumerate(others)]
@@ -279,16 +280,19 @@ def test_export(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = small_sweep(tmp_path, 2)
     sweep(path)
     store, table = tmp_path / "small.sqlite", rows(tmp_path / "small.sqlite")
-    for name in ("t.csv", "t.parquet"):
+    for name in ("t.csv", "t.parquet", "t.xlsx"):
         assert main(["sweep", "--export", str(store), "-o", str(tmp_path / name)]) == 0
     # Not with pandas, some versions of which do not read every number to the last bit.
     with (tmp_path / "t.csv").open(encoding="utf-8", newline="") as stream:
         written = list(csv.DictReader(stream))
     parquet = pandas.read_parquet(tmp_path / "t.parquet")
+    workbook = pandas.read_excel(tmp_path / "t.xlsx")
+    assert list(workbook) == list(written[0]) and len(workbook) == len(written)
     for name in table.select_dtypes("float"):
+        np.testing.assert_allclose(workbook[name], table[name], rtol=1e-14)
         np.testing.assert_array_equal([float(row[name] or "nan") for row in written], table[name])
         np.testing.assert_array_equal(parquet[name], table[name])
-    assert main(["sweep", "--export", str(store), "-o", str(tmp_path / "t.xlsx")]) == 2
+    assert main(["sweep", "--export", str(store), "-o", str(tmp_path / "t.ods")]) == 2
     assert main(["sweep", "--export", str(store), "-o", str(tmp_path / "no" / "t.csv")]) == 3
     assert main(["sweep", "--export", str(store), "--sweep", "5", "-o", "-"]) == 3
     assert main(["sweep", "--export", str(tmp_path / "none.sqlite"), "-o", "-"]) == 3

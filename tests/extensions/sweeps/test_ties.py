@@ -16,7 +16,7 @@ from tests.extensions.sweeps.stores import axis, done, made_up_result
 # Averages in micrometres by turns and length: opposite turns are alike, as of a design that is
 # mirrored, and the smallest is that of four settings.
 AVERAGES = np.array([[0.31, 0.29], [0.29, 0.37], [0.31, 0.29], [0.29, 0.37]])
-FIRST = "turns 0, c 60 mm"
+FIRST = "turns 0; c 60 mm"
 
 
 def results(path: Path, share: np.ndarray | None, seed: int | None):
@@ -50,7 +50,7 @@ def results(path: Path, share: np.ndarray | None, seed: int | None):
         (np.ones((4, 2)), FIRST),
         (np.full((4, 2), 0.5), FIRST),
         # Of the settings that meet the target none has the smallest average of all.
-        (np.where(AVERAGES == 0.31, 1.0, 0.5), "turns 0, c 50 mm"),
+        (np.where(AVERAGES == 0.31, 1.0, 0.5), "turns 0; c 50 mm"),
     ],
     ids=["without", "all", "none", "some"],
 )

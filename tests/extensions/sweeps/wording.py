@@ -12,14 +12,14 @@ HAS_THE_VARIANTS_FEW = (
 )
 IS_NOT_RECORDED = "U6 is not recorded"
 ITS_FOLDER_CANNOT_BE_WRITTEN = "its folder cannot be written; name another with --store"
-MADE_IN_THE_STUDIO = "made in the studio"
+MADE_IN_THE_STUDIO = "in Python or the studio"
 OF_CELLS_DONE = "0 of 4 cases done"
 NO_MORE_THAN_THIRTY = "ValueError: no more than thirty"
 NO_TARGET_TO_BE_COMPARED = "no target to be compared with"
 NO_VARIANT_IN_QUICKSTART_YAML = (
     's.yaml:3:10: variant: no variant "mny" in quickstart.yaml; did you mean "many"?'
 )
-OF_THE_LENGTHS = "25 % of the lengths"
+WITHIN_TARGET = "U6 within target 25.00 %"
 OUTSIDE_THE_FOLDERS_OF_THE_SWEEP = "outside the folders of the sweep"
 OUTSIDE_THE_FOLDERS_OF_THE_SWEEP_AND_ITS_BASE = "outside the folders of the sweep and its base"
 NAME_A_NEW_FILE = "name a new file with ballplate sweep --store to recompute"
@@ -29,7 +29,8 @@ THE_AXIS_CHOOSES_THE_VARIANT_ALREADY = (
     's.yaml:5:3: axes.b: the axis "a" chooses the variant already; name all variants there'
 )
 THE_CLUSTER_HAS_NO_WORKERS = "the cluster has no workers; start some with: dask worker"
-THE_ONE_WITH_THE_FEWEST = "The one with the fewest"
+FEWEST = "Fewest observations of the cases that meet the target"
+FORTY_LINES = "Lines: 40 of 400 combinations"
 THE_ONLY_SETTING_DOES_NOT_MEET = "The only case does not meet"
 THE_PROCESS_THAT_COMPUTED_IT_WAS = "the process that computed it was ended"
 THE_SAME_COMMAND_CONTINUES_FROM_THERE = "the same command continues from there"
