@@ -11,6 +11,7 @@ import re
 import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import Any
 
 import ballplate as bp
 import pytest
@@ -195,6 +196,9 @@ AGAIN: dict[str, Callable[[], str]] = {
     "shifted_six": lambda: times(recipe(SIX), plan(6)),
     "shifted_nine": lambda: times(recipe(NINE), plan(9)),
     "shifted_twelve": lambda: times(recipe(TWELVE), plan(12)),
+    "drafted_six": lambda: times(recipe("six as drafted"), plan(6)),
+    "drafted_nine": lambda: times(recipe("nine as drafted"), plan(9)),
+    "drafted_twelve": lambda: times(recipe("twelve as drafted"), plan(12)),
     "corners_assumed": lambda: everywhere(CORNERS, SIX),
     "four_positions": lambda: times(plan(4), plan(6)),
     "gain_six": lambda: less(plan(9), plan(6)),
@@ -331,7 +335,22 @@ def test_every_sweep_has_its_table() -> None:
 
 def test_a_table_has_what_run_predicts() -> None:
     recipes = yaml.safe_load((SWEEPS / "recipes.yaml").read_text(encoding="utf-8"))
-    chosen = recipes["axes"]["recipe"]["values"][CORNERS]
+    points, recipes = (recipes["axes"][axis]["values"] for axis in ("points", "recipe"))
+    chosen = {"positions": recipes[CORNERS], "evaluation.points": points["one hundred"]}
     for experiment in bp.load_all(STUDY / "machines.yaml"):
-        predicted = bp.run(experiment.with_({"positions": chosen})).quantities["U6"].average
+        predicted = bp.run(experiment.with_(chosen)).quantities["U6"].average
         assert recipe(CORNERS)[str(experiment.name)] == pytest.approx(1e6 * predicted, rel=1e-5)
+
+
+def test_recipes_as_drafted_are_those_of_init() -> None:
+    recipes = yaml.safe_load((SWEEPS / "recipes.yaml").read_text(encoding="utf-8"))
+    values = recipes["axes"]["recipe"]["values"]
+    drafts = yaml.safe_load(Path("analysis/extensions/drafting/tables.yaml").read_text("utf-8"))
+    for name, draft in zip(("six", "nine", "twelve"), drafts["starts"]["star"]["z"], strict=True):
+        of_study = [place(one) for one in values[f"{name} as drafted"]]
+        assert of_study == [place(one) for one in draft], name
+
+
+def place(position: dict[str, Any]) -> tuple[Any, ...]:
+    keys = ("plane", "level", "corner")
+    return *(position[key] for key in keys), position.get("quarter_turns", 0)
