@@ -2,7 +2,7 @@
 
     python designs/study/make_tables.py --workers 2
 
-takes half an hour on two processors. A sweep that was interrupted continues if `--stores` names the
+takes up to half an hour on two processors. An interrupted sweep continues if `--stores` names the
 same folder.
 """
 
@@ -71,7 +71,8 @@ def main() -> None:
         stores = arguments.stores or Path(temporary)
         for name in arguments.names or names():
             store = stores / f"{name}.sqlite"
-            swept = bp.sweep(HERE / "sweeps" / f"{name}.yaml", store=store, workers=arguments.workers)
+            file = HERE / "sweeps" / f"{name}.yaml"
+            swept = bp.sweep(file, store=store, workers=arguments.workers)
             table = compact(swept.to_frame())
             table.to_csv(HERE / "tables" / f"{name}.csv", index=False, lineterminator="\n")
             print(f"{name}.csv: {len(table)} rows", flush=True)
