@@ -36,7 +36,7 @@ STUDY = Path(__file__).resolve().parents[2] / "designs" / "study"
 MACHINES = ("small", "bridge", "cube", "long", "gantry")
 PLACEHOLDER = re.compile(r"\{\{(\w+)\}\}")
 
-AVERAGE, MAXIMUM = "U6_average_um", "U6_maximum_um"
+AVERAGE, DEFICIENCY = "U6_average_um", "rank_deficiency"
 Values = pd.Series  # by machine
 
 
@@ -255,8 +255,8 @@ NUMBERS: dict[str, Callable[[], str]] = {
     "gap_twelve": lambda: more(planned(12) / planned(12, "bound_um")),
     "more_precise": lambda: less(by_repeatability("twelve shifted", "nine shifted", 2e-7)),
     "less_precise": lambda: less(by_repeatability("twelve shifted", "nine shifted", 8e-7)),
-    "without_x": lambda: times(shares("none across x")),
-    "without_y": lambda: times(shares("none across y")),
+    "open_without_x": lambda: ranged(values("planes", DEFICIENCY, shares="none across x"), ".0f"),
+    "open_without_y": lambda: ranged(values("planes", DEFICIENCY, shares="none across y"), ".0f"),
     "without_z": lambda: times(shares("none across z")),
     "uneven": lambda: times(uneven()),
     "doubled": lambda: times(doubled()),
@@ -296,9 +296,9 @@ NUMBERS: dict[str, Callable[[], str]] = {
     "three_tips": lambda: times(tips("three tips, two for upright plates") / tips(STAR)),
     "one_for_position": lambda: times(tips("star, one tip for a position") / tips(STAR)),
     "across_z": lambda: less(tips("star, two tips across z as well") / tips(STAR)),
-    "open_one": lambda: ranged(tips("one tip", "rank_deficiency"), ".0f"),
-    "open_two": lambda: ranged(tips("two tips, both everywhere", "rank_deficiency"), ".0f"),
-    "open_plane": lambda: ranged(tips("star, one tip for a plane", "rank_deficiency"), ".0f"),
+    "open_one": lambda: ranged(tips("one tip", DEFICIENCY), ".0f"),
+    "open_two": lambda: ranged(tips("two tips, both everywhere", DEFICIENCY), ".0f"),
+    "open_plane": lambda: ranged(tips("star, one tip for a plane", DEFICIENCY), ".0f"),
     "offsets_unknown": lambda: more(known(1e-5)),
     "offsets_exact": lambda: less(known(5e-8)),
     "short_stylus": lambda: times(stylus("20 mm")),

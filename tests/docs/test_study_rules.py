@@ -213,8 +213,12 @@ AGAIN: dict[str, Callable[[], str]] = {
     "gap_twelve": lambda: more(plan(12), plan(12, "bound_um")),
     "more_precise": lambda: noise(TWELVE, NINE, "2e-07"),
     "less_precise": lambda: noise(TWELVE, NINE, "8e-07"),
-    "without_x": lambda: shares("none across x"),
-    "without_y": lambda: shares("none across y"),
+    "open_without_x": lambda: ranged(
+        column("planes", "rank_deficiency", shares="none across x").values(), 0
+    ),
+    "open_without_y": lambda: ranged(
+        column("planes", "rank_deficiency", shares="none across y").values(), 0
+    ),
     "without_z": lambda: shares("none across z"),
     "uneven": lambda: shares("5 x, 2 y, 2 z", "2 x, 5 y, 2 z", "2 x, 2 y, 5 z"),
     "inclined": lambda: times(
