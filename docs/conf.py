@@ -15,6 +15,7 @@ extensions = [
     "generated_pages",
     "limit_tables",
     "mathml",
+    "study_rules",
 ]
 exclude_patterns = ["_build", "_extensions"]
 nitpicky = True

@@ -33,7 +33,7 @@ NUMBER = re.compile(r"\d+(?:\.\d+)?(?:e[-+]\d+)?")
 # What a person types or writes, which no program prints, and what the pages' build makes.
 INPUT = ("python", "sh", "yaml", "toml")
 MADE = re.compile(
-    r"\{(console|edit|eval-rst|figure|file|literalinclude|picture|python-run|toctree)\}"
+    r"\{(console|edit|eval-rst|figure|file|literalinclude|picture|python-run|study|toctree)\}"
 )
 
 # The last digit of figures may differ between processors, and bounds of plans are computed to 0.1 %.
