@@ -1,5 +1,5 @@
-"""How much of a sweep's time is spent on anything but its cells, and how long a large store takes
-to read.
+"""How much of a sweep's time is spent on anything but its cells, what a case costs in terms of
+`run`, and how long a large store takes to read.
 
 Run with
 
@@ -18,6 +18,7 @@ import sys
 import time
 from pathlib import Path
 
+import ballplate as bp
 import pytest
 from ballplate.extensions.sweeps.bundle import bundle_of, definition
 from ballplate.extensions.sweeps.load import load_sweep
@@ -87,6 +88,22 @@ def test_a_large_store(tmp_path: Path) -> None:
         f"100,000 cells: {made:.1f} s to write at one go, {size:.0f} MiB, {read:.1f} s to open and"
         " read"
     )
+
+
+def test_a_case_costs_little_more_than_a_run() -> None:
+    """In one process, in turn; the first round loads what both need."""
+    experiment, path = bp.quickstart(), "machine.repeatability"
+    values = [f"{200 + k / 4:.2f} nm" for k in range(200)]
+    rounds = []
+    for _ in range(6):
+        begun = time.perf_counter()
+        for value in values:
+            bp.run(experiment.with_({path: value}))
+        between = time.perf_counter()
+        bp.sweep(experiment, {path: values})
+        rounds.append((between - begun, time.perf_counter() - between))
+    ratios = sorted(swept / run for run, swept in rounds[1:])
+    LINES.append(f"a case in terms of run: {ratios[0]:.2f} to {ratios[-1]:.2f} times")
 
 
 def test_lines(capsys: pytest.CaptureFixture[str]) -> None:
