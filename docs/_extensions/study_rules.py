@@ -26,6 +26,7 @@ from ballplate.presentation.svg import (
     placed_axes,
     save,
 )
+from ballplate.simulator.inputs import parse_length
 from docutils import nodes
 from docutils.parsers.rst import directives
 from sphinx.application import Sphinx
@@ -230,6 +231,19 @@ def losses(name: str, whole: str) -> pd.Series:
     return rest / values(name, read=whole).reindex(rest.index)
 
 
+def of_plate(design: str, other: str = "nine as drafted", is_small: bool = True) -> Values:
+    """U6 of a design relative to another, with the smallest or the largest plate of each machine:
+    35 or 65 % of the shortest edge.
+    """
+    sizes = table("plates").groupby("machine")["size_m"]
+    chosen = sizes.transform("min" if is_small else "max") == table("plates")["size_m"]
+    by = table("plates")[chosen].pivot(index="machine", columns="design", values=AVERAGE)
+    return by[design] / by[other]
+
+
+COMMON, OTHER = (f"nine with two fifths of the {part} part" for part in ("common", "other"))
+OPPOSITE = ("six in opposite corners", "six as drafted")
+
 NUMBERS: dict[str, Callable[[], str]] = {
     "corners_six": lambda: times(recipe("six in opposite corners") / planned(6)),
     "corners_twelve": lambda: times(recipe("twelve in corners") / planned(12)),
@@ -286,8 +300,17 @@ NUMBERS: dict[str, Callable[[], str]] = {
     "all_distances": lambda: less(certificate("all") / certificate("corners")),
     "half_certificate": lambda: less(certificate("corners", "half") / certificate("corners")),
     "double_certificate": lambda: more(certificate("corners", "double") / certificate("corners")),
-    "half_common": lambda: less(influence(common=1e-7)),
-    "half_constant": lambda: less(influence(certificate_m=1e-7)),
+    "corners_third": lambda: times(of_plate(*OPPOSITE)),
+    "corners_wide": lambda: times(of_plate(*OPPOSITE, is_small=False)),
+    "twice_third": lambda: less(of_plate("nine read twice")),
+    "twelve_third": lambda: less(of_plate("twelve as drafted")),
+    "kelvin_third": lambda: times(of_plate("nine at 0.1 K")),
+    "six_third": lambda: times(of_plate("nine with six coefficients")),
+    "common_third": lambda: less(of_plate(COMMON)),
+    "other_third": lambda: less(of_plate(OTHER)),
+    "common_wide": lambda: less(of_plate(COMMON, is_small=False)),
+    "other_wide": lambda: less(of_plate(OTHER, is_small=False)),
+    "gain_third": lambda: less(of_plate("nine as drafted", "six as drafted")),
     "bar_alone": lambda: times(bar("bar") / bar("plate")),
     "short_bar_alone": lambda: times(bar("bar", False) / bar("plate", False)),
     "bar_besides": lambda: less(bar("plate and bar") / bar("plate")),
@@ -334,14 +357,18 @@ NUMBERS: dict[str, Callable[[], str]] = {
 def machines() -> str:
     """The machines of the study as a table."""
     base = yaml.safe_load((STUDY / "machines.yaml").read_text(encoding="utf-8"))
-    lines = ["| machine | volume | plate | repeatability |", "|---|---|---|---|"]
+    lines = [
+        "| machine | volume | plate | of the shortest edge | repeatability |",
+        "|---" * 5 + "|",
+    ]
     for name, changes in base["variants"].items():
         volume = changes.get("machine.volume", base["machine"]["volume"])
         size = changes.get("artefacts.plate.size", base["artefacts"]["plate"]["size"])
         repeatability = changes.get("machine.repeatability", base["machine"]["repeatability"])
-        cells = (name, " x ".join(volume), size[0], repeatability.replace("um", "µm"))
+        share = parse_length(size[0]) / min(map(parse_length, volume))
+        cells = (name, " x ".join(volume), size[0], f"{share:.0%}", repeatability)
         lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join(lines)
+    return "\n".join(lines).replace(" um ", " µm ").replace("%", " %")
 
 
 NUMBERS["machines"] = machines

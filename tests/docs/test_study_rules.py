@@ -184,6 +184,16 @@ def offsets(text: str) -> tuple[dict[str, float], dict[str, float]]:
     return tuple(column("tips-known", offsets_m=one) for one in (text, "5e-07"))  # type: ignore[return-value]
 
 
+def third(design: str, which: int = 0) -> dict[str, float]:
+    """With the plate of 35 % of the shortest edge, or of 65 %."""
+    found: dict[str, list[tuple[float, float]]] = {}
+    for row in rows("plates"):
+        if row["design"] == design:
+            found.setdefault(row["machine"], []).append((float(row["size_m"]), float(row[U6])))
+    return {machine: sorted(pairs)[which][1] for machine, pairs in found.items()}
+
+
+PART, DRAFTED = "nine with two fifths of the", "nine as drafted"
 SIX, NINE, TWELVE = "six shifted", "nine shifted", "twelve shifted"
 CORNERS = "six in opposite corners"
 ONCE = read("nine", 1)
@@ -250,8 +260,17 @@ AGAIN: dict[str, Callable[[], str]] = {
     "all_distances": lambda: less(certificate("all"), certificate("corners")),
     "half_certificate": lambda: less(certificate("corners", "half"), certificate("corners")),
     "double_certificate": lambda: more(certificate("corners", "double"), certificate("corners")),
-    "half_common": lambda: less(assumed(NINE, common="1e-07"), assumed(NINE)),
-    "half_constant": lambda: less(assumed(NINE, certificate_m="1e-07"), assumed(NINE)),
+    "corners_third": lambda: times(third(CORNERS), third("six as drafted")),
+    "corners_wide": lambda: times(third(CORNERS, -1), third("six as drafted", -1)),
+    "twice_third": lambda: less(third("nine read twice"), third(DRAFTED)),
+    "twelve_third": lambda: less(third("twelve as drafted"), third(DRAFTED)),
+    "kelvin_third": lambda: times(third("nine at 0.1 K"), third(DRAFTED)),
+    "six_third": lambda: times(third("nine with six coefficients"), third(DRAFTED)),
+    "common_third": lambda: less(third(f"{PART} common part"), third(DRAFTED)),
+    "other_third": lambda: less(third(f"{PART} other part"), third(DRAFTED)),
+    "common_wide": lambda: less(third(f"{PART} common part", -1), third(DRAFTED, -1)),
+    "other_wide": lambda: less(third(f"{PART} other part", -1), third(DRAFTED, -1)),
+    "gain_third": lambda: less(third(DRAFTED), third("six as drafted")),
     "bar_alone": lambda: times(bar("bar", True), bar("plate", True)),
     "short_bar_alone": lambda: times(bar("bar", False), bar("plate", False)),
     "bar_besides": lambda: less(bar("plate and bar", True), bar("plate", True)),
