@@ -165,9 +165,9 @@ def test_a_statement_holds_elsewhere(statement: str, name: str) -> None:
 
 
 @pytest.mark.parametrize("name", MACHINES)
-def test_errors_of_each_position_matter_more(name: str) -> None:
-    common, each = (ratio(name, heat(f"{one}_uncertainty")) for one in ("standard", "sensor"))
-    assert each > common > 1.0
+def test_an_error_of_all_temperatures_matters_more(name: str) -> None:
+    each, common = (ratio(name, heat(f"{one}_uncertainty")) for one in ("standard", "sensor"))
+    assert common > each > 1.0
 
 
 @pytest.mark.parametrize("name", MACHINES)

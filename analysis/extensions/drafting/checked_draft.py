@@ -44,13 +44,14 @@ def drafted(path: Path, sheet: DataSheet, texts: Mapping[str, str], command: str
 
     :raises ValueError: the plate, the tips and the volume do not go together.
     """
-    strategies = list(strategies_of(sheet.tips_there, sheet.places))
-    for starts in reversed(strategies[1:]):
-        text = draft(sheet, texts, command, starts)
-        (experiment,) = load(path, text=text)
-        if spent_as_drawn(experiment).seconds <= HOUR * sheet.hours:
-            return text
-    return draft(sheet, texts, command, strategies[0])
+    text = ""
+    for starts in reversed(list(strategies_of(sheet.tips_there, sheet.places))):
+        (experiment,) = load(path, text=draft(sheet, texts, command, starts))
+        hours = spent_as_drawn(experiment).seconds / HOUR
+        text = draft(sheet, texts, command, starts, hours)
+        if hours <= sheet.hours:
+            break
+    return text
 
 
 def _least_hours(experiment: Experiment) -> float:

@@ -25,10 +25,14 @@ ERRORS = 1 / 8
 
 
 def draft(
-    sheet: DataSheet, texts: Mapping[str, str], next_command: str, starts: Sequence[Settings]
+    sheet: DataSheet,
+    texts: Mapping[str, str],
+    next_command: str,
+    starts: Sequence[Settings],
+    hours: float = 0.0,
 ) -> str:
-    """Return the text of an experiment file with the positions `starts`; `texts` as stated and
-    `next_command` go into its comments.
+    """Return the text of an experiment file with the positions `starts`, which take some `hours`;
+    `texts` as stated and `next_command` go into its comments.
 
     :raises ValueError: the plate, the tips and the volume do not go together.
     """
@@ -67,7 +71,7 @@ def draft(
         probes=_tips(tips, rounded(sheet.tips.uncertainty)),
         influences=_influences(sheet.temperature),
         plate=_flow(plate | {"role": "plate"}),
-        rule=rule(sheet, len(starts)),
+        rule=rule(sheet, len(starts), hours),
         positions=_entries(starts),
         certificate=function_text(sheet.certificate.stated),
         factor=f"{sheet.certificate.coverage_factor:g}",
@@ -80,14 +84,16 @@ def draft(
     )
 
 
-def rule(sheet: DataSheet, count: int) -> str:
-    """Return why a draft has so many positions, as lines of a comment; empty without a choice."""
+def rule(sheet: DataSheet, count: int, hours: float) -> str:
+    """Return why a draft has so many positions, which take some hours, as lines of a comment; empty
+    without a choice.
+    """
     if len(table("starts")[sheet.tips_there.form][sheet.tips_there.pointing]) == 1:
         return ""
-    nearness = table("nearness")[str(count)]
+    more = "" if hours <= sheet.hours else f", more than the {sheet.hours:g} h for measuring"
     return (
-        f"\n# {count} positions of a simple strategy, as {sheet.hours:g} h allow; on machines of"
-        f" many shapes, U6 was {nearness} times\n# that of a plan of as many positions."
+        f"\n# {count} positions of a simple strategy, {hours:.1f} h{more}. On machines of many"
+        f" shapes, U6 was\n# {table('nearness')[str(count)]} times that of a plan of as many."
     )
 
 

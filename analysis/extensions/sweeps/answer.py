@@ -52,14 +52,14 @@ def answer(result: SweepCases) -> SweepAnswer | None:
     if not np.isfinite(cost[meets]).any():
         unit, cost = "observations", result.figure("observations")[done]
     # Cases to find: by a figure, among some.
-    wanted = [(f"Smallest average of {quantity(column)}", known, value)]
+    wanted = [(f"smallest average of {quantity(column)}", known, value)]
     if meets.any():
         order = best_first(~meets, comparable(cost), value)
-        words = f"Fewest {unit} of the cases that meet the target"
+        words = f"fewest {unit} of the cases that meet the target"
         wanted.append((words, meets & np.isfinite(cost), cost))
     elif judged.any():
         order = best_first(-share, value)
-        wanted.append(("Nearest to the target", judged, -share))
+        wanted.append(("nearest to the target", judged, -share))
     else:
         order = best_first(~known, value)
     found: dict[int, str] = {}
@@ -70,7 +70,10 @@ def answer(result: SweepCases) -> SweepAnswer | None:
             before = f"{found[rows[0]]}; " if rows[0] in found else ""
             found[rows[0]] = f"{before}{words}{one_of}"
     lines = described(result, found)
-    outstanding = {row: f"{found[row]}: {line}." for row, line in zip(found, lines, strict=True)}
+    outstanding = {
+        row: f"{words[:1].upper()}{words[1:]}: {line}."
+        for (row, words), line in zip(found.items(), lines, strict=True)
+    }
     sentences = [*_verdict(result, meets, judged), *outstanding.values()]
     if not known.any():
         sentences.append(f"Every case leaves some of {quantity(column)} undetermined.")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import replace
+from math import isnan
 
 from ballplate.simulator.experiment import node_at, override
 from ballplate.simulator.inputs import (
@@ -60,17 +61,21 @@ def read_axis(
     choices = _choices(here, sources[0], settings, root, trees, variant, problems)
     if len(problems.messages) > before:
         return None
-    check_labels(here, choices, problems)
+    axis = _with_numbers(name, choices, sources[0] in ("values", "start"))
+    check_labels(here, axis.choices, problems)
     if len(problems.messages) > before:
         return None
     _check_paths(here, choices, trees, problems)
-    return _with_numbers(name, choices, sources[0] in ("values", "start"))
+    return axis
 
 
 def check_labels(here: Steps, choices: Iterable[Choice], problems: Problems) -> None:
     """Refuse an axis that has a value twice."""
-    counts = Counter(choice.label for choice in choices)
-    repeated = next((text for text, times in counts.items() if times > 1), None)
+    labels = Counter(choice.label for choice in choices)
+    values = Counter(choice.value for choice in choices if not isnan(choice.value))
+    repeated = next(
+        (each.label for each in choices if max(labels[each.label], values[each.value]) > 1), None
+    )
     if repeated is not None:
         problems.add(
             here, f'has the value "{repeated}" twice; remove one, or name the values differently'

@@ -43,9 +43,10 @@ COSTS = {
     "hours": "hours",
     "observations": "observations",
     "rank_deficiency": "rank deficiency",
+    "criterion_m": "criterion, µm",
     "bound_m": "bound, µm",
-    "distance_error_rms_m": "errors of distances, rms, µm",
-    "distance_error_bias_m": "bias, µm",
+    "distance_error_rms_m": "rms error of distances, µm",
+    "distance_error_bias_m": "bias of distances, µm",
 }
 IN_TEXT = ("average", "within_target")
 FIGURE = re.compile(rf"(.+?)_({'|'.join(SHOWN)})(?:_(m|rad|m_or_rad|ratio))?")

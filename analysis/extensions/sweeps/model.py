@@ -99,13 +99,12 @@ class Sweep:
         return tuple(axis.choices[k] for axis, k in zip(self.axes, self.cells[number], strict=True))
 
     def estimators(self, number: int) -> tuple[str, ...]:
-        """The estimator of a cell, and the one that shares its data sets with the full one; empty
+        """The estimator of a cell, and those that may share its data sets with the full one; empty
         where none is compared.
         """
-        names = [choice.estimator for axis in self.axes for choice in axis.choices]
-        others = [name for name in names if name not in ("", "full")]
+        names = {choice.estimator for axis in self.axes for choice in axis.choices} | {"distances"}
         own = "".join(choice.estimator for choice in self.choices(number))
-        return (own, own if own != "full" else next(iter(others), "distances")) if own else ()
+        return (own, *(sorted(names - {"", "full"}) if own == "full" else [own])) if own else ()
 
     def label(self, number: int) -> str:
         """Axes of a cell with their values."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -35,17 +35,19 @@ def cost_figures(spent: Spent) -> dict[str, float]:
 
 
 def choice_figures(planned: Campaign) -> dict[str, float]:
-    """Return the cost of a plan and its bound by the names of their columns."""
-    return cost_figures(planned.spent) | {f"bound_{unit_suffix(planned.unit)}": planned.bound}
+    """Return the cost of a plan, its criterion and the bound, by the names of their columns."""
+    unit = unit_suffix(planned.unit)
+    found = {f"bound_{unit}": planned.bound, f"criterion_{unit}": planned.value}
+    return cost_figures(planned.spent) | found
 
 
-def drawing(experiment: Experiment) -> str:
+def drawing(experiment: Experiment, names: Mapping[str, str]) -> str:
     """Return what a drawing of a design needs, as JSON: the `volume` and, by their names, the outer
-    balls of the `positions`, in metres.
+    balls of the `positions`, in metres; `names` are those that replace short ones.
     """
     volume = experiment.machine.volume
     ends = np.stack([volume.lower, volume.upper], axis=1)
-    places = [[name, corners] for name, corners in _corners(experiment)]
+    places = [[names.get(name, name), corners] for name, corners in _corners(experiment)]
     return json.dumps({"volume": ends.tolist(), "positions": places})
 
 

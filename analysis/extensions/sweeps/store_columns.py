@@ -23,6 +23,8 @@ NAMES = (
     "hours",
     "bound_m",
     "bound_ratio",
+    "criterion_m",
+    "criterion_ratio",
     "chosen",
     "drawing",
     "rank_deficiency",

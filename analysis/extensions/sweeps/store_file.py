@@ -15,12 +15,9 @@ from ballplate.simulator.inputs import UnusableError, in_one_line
 from .stored import damage
 
 # Its number rises whenever tables change, or any experiment gets other results.
-FORMAT = "ballplate sweep store 3"
-# A format that is read but not continued, and its further table, which is not read.
-EARLIER = "ballplate sweep store 2"
-FILES = """CREATE TABLE bundle (
-    sweep INTEGER, path TEXT, content BLOB NOT NULL, digest BLOB, PRIMARY KEY (sweep, path)
-) WITHOUT ROWID"""
+FORMAT = "ballplate sweep store 4"
+# A format that is read but not continued.
+EARLIER = "ballplate sweep store 3"
 
 # Seconds to wait for another writing process.
 PATIENCE = 20.0
@@ -185,7 +182,6 @@ def check_tables(path: Path, connection: sqlite3.Connection) -> str:
         text = f"was made by another version of ballplate (format {number}); use that version"
         raise StoreError(f"{path}: {text}, or {RECOMPUTE}")
     tables = {text.strip() for text in TABLES.split(";")[:-1]}
-    tables |= {FILES} if stored_format == EARLIER else set()
     if stored_format not in (FORMAT, EARLIER) or statements != tables:
         raise StoreError(f"{path}: is no store of ballplate sweep but another database; {MEND}")
     return stored_format

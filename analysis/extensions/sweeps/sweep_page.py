@@ -37,8 +37,8 @@ CAPTIONS = {
     "cases": "Cases by number",
 }
 COSTS = note(
-    "Observations are readings and certified values. Assumptions are assessed for the first case of"
-    " this table and those above it only, when all cases are done."
+    "Observations are readings and certified values. Where cases are not planned, assumptions are"
+    " assessed for the first case of this table and those above it only, when all cases are done."
 )
 EFFECTS = "Largest average over smallest along each axis, for each combination of the others"
 HEADS = (
@@ -132,6 +132,8 @@ def _facts(result: SweepCases) -> list[tuple[str, str]]:
         ("Sweep", "in Python or the studio") if is_made else ("Sweep file", source),
         ("Experiment", f"{stored['base']}: {base}" if base else stored["base"]),
     ]
+    if plan := stored["sweep"].get("plan"):
+        facts.append(("Plan", ", ".join(f"{key} {value}" for key, value in plan.items())))
     for axis in result.axes:
         labels = list(axis.labels)
         if len(labels) > LISTED:

@@ -169,7 +169,10 @@ class SweepSettings(Settings):
     trials: Annotated[int, Field(ge=2, le=MOST_TRIALS)] | None = Field(
         None, description="synthetic data sets of each case; default: none"
     )
-    seed: Seed = Field(1, description="of the data sets; each case derives its own")
+    seed: Seed = Field(
+        1,
+        description="of the data sets; each case derives its own, except for estimators",
+    )
     record: NonEmpty[Quantity] = Field(
         RECORDED, description=f"quantities that are kept, {KEPT} and {MORE}; default: all of {KEPT}"
     )

@@ -153,17 +153,21 @@ def _whole(
         figures = choice_figures(choice)
         given = [each.given for each in choice.qualifications]
         details |= {"chosen": [candidate.name for candidate in choice.chosen], "assessed": True}
+        names = {short: name for name, short in choice.sheet.names.items()}
     else:
-        planned, figures = predict(experiment), cost_figures(cost)
+        planned, figures, names = predict(experiment), cost_figures(cost), {}
         deficiency = planned.verdict.deficiency
         given = _given(qualifications_of(deficiency, None, None, experiment))
         # Whether the scale rests on them takes longer than the figures.
         given += ["exact probe offsets"] * bool(exact_offsets(experiment))
         if lost := unspanned(base_tree(sweep, task.number), experiment):
             details["unspanned"] = lost
-    figures |= plan_figures(planned, sweep.record)
-    details |= {"given": list(dict.fromkeys(given)), "drawing": drawing(experiment)}
-    if estimators := sweep.estimators(task.number):
+    estimators = sweep.estimators(task.number)
+    # U1 to U6 are those of the full estimator.
+    figures |= plan_figures(planned, () if estimators[:1] not in ((), ("full",)) else sweep.record)
+    details |= {"given": list(dict.fromkeys(given)), "drawing": drawing(experiment, names)}
+    if estimators:
+        seed = sweep.seed
         figures |= distance_errors(sweep, experiment, *estimators)
     elif sweep.trials is not None:
         if task.total is not None:
@@ -254,14 +258,23 @@ def plan_figures(planned: Prediction, record: tuple[str, ...]) -> dict[str, floa
 
 
 def distance_errors(
-    sweep: Sweep, experiment: Experiment, estimator: str, compared: Any
+    sweep: Sweep, experiment: Experiment, estimator: str, *compared: Any
 ) -> dict[str, float]:
-    """Return errors of distances that an estimator corrects, over the data sets of a sweep that
-    `compared` and the full estimator converge on; none if distances are undetermined.
+    """Return errors of distances that an estimator corrects, over the data sets of a sweep on which
+    it and the full one, or the first of `compared` that the design allows, converge; none if
+    distances are undetermined.
+
+    :raises ExperimentError: the design allows none.
     """
     from ballplate.extensions.estimators import compare_estimators
 
-    found = compare_estimators(experiment, sweep.trials or 2, compared, seed=sweep.seed)
+    first, *others = compared
+    try:
+        found = compare_estimators(experiment, sweep.trials or 2, first, seed=sweep.seed)
+    except ExperimentError:
+        if not others:
+            raise
+        return distance_errors(sweep, experiment, estimator, *others)
     figures = {"trials": float(found.trials), "not_converged": float(len(found.failed))}
     if errors := found.of_truth.get(estimator):
         figures |= {"distance_error_rms_m": errors.rms, "distance_error_bias_m": errors.bias}

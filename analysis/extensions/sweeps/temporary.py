@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +12,13 @@ from ballplate.simulator.inputs import Mark, Node, refused, to_list, to_python, 
 
 from .bundle import Bundle, names_of, unpack
 from .limits import LIMITS
+from .store_columns import is_reserved
 
 # Name of the file.
 TEMPORARY = ".ballplate-sweep.yaml"
 MARK = Mark("sweep", 0, 0)
+# Keys of an axis as a file has it.
+OF_FILES = {"path", "paths", "together", "variants"}
 
 
 def written_sweep(
@@ -43,7 +46,8 @@ def written_sweep(
 def _values(axes: Mapping[str, Any]) -> Iterator[tuple[str, Node]]:
     """Yield the paths of axes with each of their values."""
     for axis in axes.values():
-        columns = axis.get("together") or dict.fromkeys(axis["paths"], axis["values"])
+        paths = axis.get("paths") or [axis[key] for key in ("path",) if key in axis]
+        columns = axis.get("together") or dict.fromkeys(paths, axis.get("values", ()))
         for path, values in columns.items():
             for value in values.values() if isinstance(values, Mapping) else values:
                 yield path, node_of(value, MARK)
@@ -60,32 +64,42 @@ def sweep_of(
     :raises ExperimentError: a value cannot be written, or a file cannot be copied.
     """
     swept: dict[str, Any] = {}
+    more: dict[str, Any] = {}
     plan = dict(content.get("plan", {}))
     for key, stated in axes.items():
-        values = stated if isinstance(stated, Mapping) else list(stated)
+        paths = [key] if isinstance(key, str) else list(key)
+        values = stated.tolist() if hasattr(stated, "tolist") else stated
+        if isinstance(values, Mapping) and not OF_FILES.isdisjoint(values):
+            swept[" ".join(paths)] = dict(values)
+            continue
+        is_limit = key in LIMITS
+        if isinstance(values, str) and not is_limit or not isinstance(values, Iterable):
+            raise refused(experiment.source, f"{key}: {values!r} is no list of values; give one")
+        values = values if isinstance(values, str | Mapping) else list(values)
+        rows = list(values.values()) if isinstance(values, Mapping) else values
+        is_row = [isinstance(row, list | tuple) for row in rows]
         if key == "hours":
-            plan[key] = [
-                f"{hours!s} h" if not isinstance(hours, str) else hours for hours in values
-            ]
-        elif key in LIMITS and not any(
-            isinstance(value, list | tuple | Mapping) for value in values
-        ):
-            plan[key] = values
-        elif isinstance(key, tuple) and not isinstance(values, Mapping) and _are_rows(values, key):
-            columns = zip(*values, strict=True)
-            swept[" ".join(key)] = {"together": dict(zip(key, map(list, columns), strict=True))}
+            plan[key] = [hours if isinstance(hours, str) else f"{hours} h" for hours in rows]
+        elif key == "estimator":
+            more[key] = values
+        elif is_limit and not any(is_row):
+            plan[key] = values if isinstance(values, str) else rows
+        elif len(paths) > 1 and all(is_row):
+            if {*map(len, rows)} != {len(paths)}:
+                text = f"{key}: not every row has {len(paths)} values, one for each path"
+                raise refused(experiment.source, text)
+            columns = map(list, zip(*rows, strict=True))
+            swept[" ".join(paths)] = {"together": dict(zip(paths, columns, strict=True))}
+            if isinstance(values, Mapping):
+                swept[" ".join(paths)]["names"] = list(values)
         else:
-            paths = [key] if isinstance(key, str) else list(key)
-            swept[" ".join(paths)] = {"paths": paths, "values": values}
-    content = {"title": experiment.title, **content, "axes": swept}
+            name = " ".join(paths)
+            name = f"{name} stated" if is_reserved(name) else name
+            swept[name] = {"paths": paths, "values": values}
+    content = {"title": experiment.title, **content, **more, "axes": swept}
     content |= {"plan": plan} if plan else {}
     design = yaml_text(to_list(to_python(experiment.tree))).encode()
     try:
         return written_sweep(design, experiment, experiment.source, content, folder)
     except (OSError, ValueError) as error:
         raise refused(experiment.source, str(error)) from None
-
-
-def _are_rows(values: list[Any], paths: tuple[str, ...]) -> bool:
-    """Return whether each value is a row of values, one for each path."""
-    return all(isinstance(value, list | tuple) and len(value) == len(paths) for value in values)

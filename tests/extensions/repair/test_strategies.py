@@ -54,6 +54,20 @@ def test_a_better_strategy_is_suggested_and_is_as_good_as_stated(
     assert "strategy" not in capsys.readouterr().out
 
 
+def test_a_strategy_reads_with_the_tips_of_each_plane(
+    corners: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Also where a position that is switched off comes first."""
+    content = yaml.safe_load(corners.read_text(encoding="utf-8"))
+    content["positions"].insert(0, CORNERS[4] | {"name": "off", "enabled": False})
+    corners.write_text(yaml.safe_dump(content), encoding="utf-8")
+    main(["check", str(corners), "--suggest", "-q"])
+    lines = capsys.readouterr().out.splitlines()
+    entries = [yaml.safe_load(one.partition(": - ")[2]) for one in lines if ": - " in one]
+    probes = {one["plane"]: one["probes"] for one in CORNERS}
+    assert entries and all(one["probes"] == probes[one["plane"]] for one in entries)
+
+
 @pytest.mark.parametrize(
     "file", ["hocken_borchardt/dummy.yaml", "planning/campaign.yaml", "hurt_foss/bar-bell.yaml"]
 )

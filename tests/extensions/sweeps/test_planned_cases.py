@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from pathlib import Path
+from typing import Any
 
 import ballplate as bp
 import numpy as np
@@ -13,6 +14,7 @@ import pytest
 from ballplate.cli import main
 from ballplate.extensions.planning import Budget, spent_as_drawn
 from ballplate.extensions.planning.constraints import constraints
+from ballplate.extensions.sweeps.answer import answer
 from ballplate.extensions.sweeps.load import load_sweep
 from ballplate.simulator.experiment import with_pool
 from ballplate.simulator.inputs import ExperimentError
@@ -62,7 +64,7 @@ def test_cases_are_plans_to_the_last_bit(planned: Path) -> None:
         ("{positions: 6 to 4}", "plan.positions: expected a number, a list, or a range from low"),
         ("{positions: 4 - 6}", "plan.positions: expected a number, a list, or a range from low"),
         ("{hours: 4}", 'plan.hours: "4" has no unit; write for example "4 min"'),
-        ("{hours: [4 h, 4 h]}", 'plan.hours: has the value "4 h" twice'),
+        ("{hours: [4 h, 240 min]}", 'plan.hours: has the value "4 h" twice'),
     ],
 )
 def test_what_is_wrong_with_a_plan_is_said(planned: Path, plan: str, expected: str) -> None:
@@ -135,8 +137,34 @@ def test_values_of_python(tmp_path: Path) -> None:
     run = bp.run(base.with_(changed | {"error_model.position_coefficients": 4}))
     assert table["U6_average_m"][6] == run["U6"].average
     assert len(table) == 8 and not list(tmp_path.iterdir())
-    with pytest.raises(ExperimentError, match="a object cannot be written; give text"):
-        bp.sweep(base, {"machine.repeatability": [object()]})
+    rows = {"a": ("10 %", "60 %"), "b": ("30 %", "80 %")}
+    more = {
+        "noise": {"path": "machine.repeatability", "from": "0.2 um", "to": "0.4 um", "count": 2}
+    }
+    named = bp.sweep(base, {levels: rows, **more}, record=["U6"]).to_frame()
+    assert named[" ".join(levels)].unique().tolist() == ["a", "b"]
+    assert named["U6_average_m"].tolist() == table["U6_average_m"][1::2].tolist()
+
+
+@pytest.mark.parametrize(
+    ("axes", "expected"),
+    [
+        ({"machine.repeatability": [object()]}, "a object cannot be written; give text"),
+        ({"machine.repeatability": "0.2 um"}, "'0.2 um' is no list of values; give one"),
+        ({"machine.repeatability": None}, "None is no list of values; give one"),
+        ({("machine.repeatability", "seed"): [("0.2 um",)]}, "not every row has 2 values, one for"),
+        ({"positions": "6 to 4"}, "plan.positions: expected a number, a list, or a range"),
+    ],
+)
+def test_values_of_python_that_are_wrong(axes: dict[Any, Any], expected: str) -> None:
+    with pytest.raises(ExperimentError, match=expected) as caught:
+        bp.sweep(bp.quickstart(), axes)
+    assert "/tmp" not in str(caught.value)
+
+
+def test_a_sweep_file_has_its_settings_itself(planned: Path) -> None:
+    with pytest.raises(ValueError, match="a sweep file has trials, plan itself"):
+        bp.sweep(planned, trials=3, criterion="U5")
 
 
 def test_estimators_are_an_axis(tmp_path: Path) -> None:
@@ -148,7 +176,15 @@ def test_estimators_are_an_axis(tmp_path: Path) -> None:
     with pytest.raises(ExperimentError, match="3:12: estimator: needs data sets; add trials: 100"):
         load_sweep(path)
     path.write_text(f"{text}trials: 3\n", encoding="utf-8")
-    table = bp.sweep(path).to_frame().set_index("estimator")
+    result = bp.sweep(path)
+    table = result.to_frame().set_index("estimator")
+    # U6 is that of the full estimator, and no verdict is of another.
+    assert table["U6_average_m"].isna().tolist() == [False, True]
+    assert answer(result).sentences[0].startswith("1 of 1 case meets")
+    python = {"estimator": ["full", "distances"]}
+    again = bp.sweep(bp.quickstart(), python, trials=3, seed=5).to_frame().set_index("estimator")
+    figures = ["distance_error_rms_m", "distance_error_bias_m", "data_set_seed", "U6_average_m"]
+    assert again[figures].equals(table[figures])
     errors = bp.compare(bp.quickstart(), trials=3, seed=5).of_truth
     for name in ("full", "distances"):
         assert table["distance_error_rms_m"][name] == errors[name].rms

@@ -84,8 +84,6 @@ def test_a_store_of_an_earlier_format_is_read_but_not_continued(
     assert sweep(path) == 1
     right = rows(store)
     connection = sqlite3.connect(store)
-    connection.execute(store_file.FILES)
-    connection.execute("INSERT INTO bundle (sweep, path, content) VALUES (1, 'a.yaml', x'00')")
     connection.execute("UPDATE about SET value = ?", [store_file.EARLIER])
     connection.commit()
     connection.close()

@@ -29,7 +29,7 @@ THE_AXIS_CHOOSES_THE_VARIANT_ALREADY = (
     's.yaml:5:3: axes.b: the axis "a" chooses the variant already; name all variants there'
 )
 THE_CLUSTER_HAS_NO_WORKERS = "the cluster has no workers; start some with: dask worker"
-FEWEST = "Fewest observations of the cases that meet the target"
+FEWEST = "ewest observations of the cases that meet the target"
 FORTY_LINES = "Lines: 40 of 400 combinations"
 THE_ONLY_SETTING_DOES_NOT_MEET = "The only case does not meet"
 THE_PROCESS_THAT_COMPUTED_IT_WAS = "the process that computed it was ended"
