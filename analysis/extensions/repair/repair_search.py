@@ -150,12 +150,12 @@ def better_strategy(experiment: Experiment) -> Iterator[str]:
     after = inf if drafted is None else loosened(drafted)
     if drafted is None or not after < IMPROVED * before:
         return
-    own = "is undetermined" if before == inf else f"is {number(1e6 * before)} µm"
+    own = "undetermined" if before == inf else f"{number(1e6 * before)} µm"
     if exact_offsets(experiment):
         own += f", both with {1e6 * OFFSET_TRIAL:g} µm on the exact probe offsets"
     yield (
         f"strategy: with the {len(positions)} positions of a simple strategy average U6 would be"
-        f" {number(1e6 * after)} µm, where it {own}; a plan may do better still"
+        f" {number(1e6 * after)} µm instead of {own}; a plan may do better still"
     )
     yield "strategy, in the file: positions:"
     for position in positions:

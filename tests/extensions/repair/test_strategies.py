@@ -43,7 +43,7 @@ def test_a_better_strategy_is_suggested_and_is_as_good_as_stated(
     changed = bp.load(corners).with_(positions=entries)
     after = bp.run(changed)["U6"].average
     assert after < 0.95 * before and len(entries) == 6
-    assert f"U6 would be {1e6 * after:.4g} µm, where it is {1e6 * before:.4g} µm" in lines[0]
+    assert f"U6 would be {1e6 * after:.4g} µm instead of {1e6 * before:.4g} µm" in lines[0]
     corners.write_text(
         yaml.safe_dump(
             yaml.safe_load(corners.read_text(encoding="utf-8")) | {"positions": entries}
