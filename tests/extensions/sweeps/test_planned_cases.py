@@ -16,6 +16,7 @@ from ballplate.extensions.planning import Budget, spent_as_drawn
 from ballplate.extensions.planning.constraints import constraints
 from ballplate.extensions.sweeps.answer import answer
 from ballplate.extensions.sweeps.load import load_sweep
+from ballplate.extensions.sweeps.temporary import TEMPORARY
 from ballplate.simulator.experiment import with_pool
 from ballplate.simulator.inputs import ExperimentError
 
@@ -159,7 +160,7 @@ def test_values_of_python(tmp_path: Path) -> None:
 def test_values_of_python_that_are_wrong(axes: dict[Any, Any], expected: str) -> None:
     with pytest.raises(ExperimentError, match=expected) as caught:
         bp.sweep(bp.quickstart(), axes)
-    assert "/tmp" not in str(caught.value)
+    assert TEMPORARY not in str(caught.value)
 
 
 def test_a_sweep_file_has_its_settings_itself(planned: Path) -> None:
