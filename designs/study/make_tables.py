@@ -2,7 +2,7 @@
 
     python designs/study/make_tables.py --workers 2
 
-takes up to half an hour on two processors. An interrupted sweep continues if `--stores` names the
+takes a quarter of an hour on two processors. An interrupted sweep continues if `--stores` names the
 same folder.
 """
 
@@ -69,6 +69,7 @@ def main() -> None:
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as temporary:
         stores = arguments.stores or Path(temporary)
+        stores.mkdir(parents=True, exist_ok=True)
         for name in arguments.names or names():
             store = stores / f"{name}.sqlite"
             file = HERE / "sweeps" / f"{name}.yaml"
