@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ballplate.presentation import Data, Result
 from ballplate.simulator.experiment import Candidate, ChangeTimes, Experiment
-from ballplate.simulator.inputs import refused, to_python
+from ballplate.simulator.inputs import refused
 
-from ..planning import RunSheet, in_lengths, sheet_data, sheet_lines, steps_of, summary
+from ..planning import (
+    RunSheet,
+    in_lengths,
+    settings_as_drawn,
+    sheet_data,
+    sheet_lines,
+    steps_of,
+    summary,
+)
 from .reading_lists import planned_readings, points_csv, points_dmis, template_csv
 from .sheet_page import sheet_page
 
@@ -69,9 +76,7 @@ class Sheet(Result):
 
 def sheet_of(experiment: Experiment) -> Sheet:
     """Return the run sheet of an experiment, in the order of its positions."""
-    tree = to_python(experiment.tree)
-    positions = tree.get("positions", ()) if isinstance(tree, Mapping) else ()
-    by_name = {str(settings["name"]): settings for settings in positions}
+    by_name = settings_as_drawn(experiment)
     pool = experiment.pool
     candidates = () if pool is None else pool.candidates
     timed = {candidate.name: candidate.seconds for candidate in candidates if candidate.drawn}

@@ -44,14 +44,12 @@ def drafted(path: Path, sheet: DataSheet, texts: Mapping[str, str], command: str
 
     :raises ValueError: the plate, the tips and the volume do not go together.
     """
-    text = ""
     for starts in reversed(list(strategies_of(sheet.tips_there, sheet.places))):
         (experiment,) = load(path, text=draft(sheet, texts, command, starts))
         hours = spent_as_drawn(experiment).seconds / HOUR
-        text = draft(sheet, texts, command, starts, hours)
         if hours <= sheet.hours:
             break
-    return text
+    return draft(sheet, texts, command, starts, hours)
 
 
 def _least_hours(experiment: Experiment) -> float:

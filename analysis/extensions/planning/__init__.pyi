@@ -9,7 +9,7 @@ from .constraints import (
 )
 from .criteria import DESCRIPTIONS as DESCRIPTIONS, criterion as criterion
 from .information import Frames as Frames, pool_information as pool_information
-from .own_cost import spent_as_drawn as spent_as_drawn
+from .own_cost import settings_as_drawn as settings_as_drawn, spent_as_drawn as spent_as_drawn
 from .pools import seconds_of as seconds_of
 from .remaining_candidates import Offer as Offer, offer as offer
 from .room_lengths import in_lengths as in_lengths

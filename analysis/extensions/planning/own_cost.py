@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from ballplate.simulator.experiment import (
-    Candidate,
-    ChangeTimes,
-    Experiment,
-    TimesSettings,
-    node_at,
-)
-from ballplate.simulator.inputs import Mapping, Sequence, child, to_python
+from typing import Any
+
+from ballplate.simulator.experiment import Candidate, Experiment, TimesSettings, node_at
+from ballplate.simulator.inputs import to_python
 
 from .constraints import Budget, Spent, constraints
-from .pools import PLANE_CHANGE, PROBE_CHANGE, READING, SET_UP, seconds_of
+from .pools import change_times, durations, seconds_of
+
+
+def settings_as_drawn(experiment: Experiment) -> dict[str, Any]:
+    """Return the settings of the positions of an experiment's file, by their names."""
+    node = node_at(experiment.tree, "positions")
+    listed: Any = () if node is None else to_python(node)
+    return {str(settings["name"]): settings for settings in listed}
 
 
 def spent_as_drawn(experiment: Experiment) -> Spent:
@@ -21,26 +24,11 @@ def spent_as_drawn(experiment: Experiment) -> Spent:
     """
     node = node_at(experiment.tree, "pool.times")
     times = TimesSettings.model_validate({} if node is None else to_python(node))
-    probe = PROBE_CHANGE if times.probe_change is None else times.probe_change
-    plane = PLANE_CHANGE if times.plane_change is None else times.plane_change
-    listed = node_at(experiment.tree, "positions")
-    planes = {
-        str(to_python(entry.items["name"])): to_python(entry.items["plane"])
-        for entry in (listed.items if isinstance(listed, Sequence) else ())
-        if isinstance(entry, Mapping) and child(entry, "name") and child(entry, "plane")
-    }
+    settings, changes = settings_as_drawn(experiment), change_times(times)
     candidates = []
     for position in experiment.positions:
-        own = (times.positions or {}).get(position.name, times)
-        set_up, reading = (
-            next((value for value in stated if value is not None), usual)
-            for stated, usual in (
-                ((own.set_up, times.set_up), SET_UP),
-                ((own.reading, times.reading), READING),
-            )
-        )
-        across = str(planes.get(position.name, "")) if experiment.dimension == 3 else ""
-        seconds = seconds_of(position, set_up, reading, probe)
-        candidates.append(Candidate(position.name, position, seconds, across, "", True, {}))
-    every = constraints(candidates, ChangeTimes(probe, plane), Budget())
-    return every.spent(range(len(candidates)))
+        set_up, reading = durations(times, (times.positions or {}).get(position.name))
+        seconds = seconds_of(position, set_up, reading, changes.probe)
+        plane = settings.get(position.name, {}).get("plane") if experiment.dimension == 3 else None
+        candidates.append(Candidate(position.name, position, seconds, plane or "", "", True, {}))
+    return constraints(candidates, changes, Budget()).spent(range(len(candidates)))

@@ -280,9 +280,7 @@ def resolve_pool(
     at_most += [AtMost(tuple(members), 1) for members in radii.values() if len(members) > 1]
     limits, times = sections.pool.limits, sections.pool.times
     must, limited = _limits(limits, chosen_from, complete, references)
-    changes = ChangeTimes(
-        _or(times.probe_change, PROBE_CHANGE), _or(times.plane_change, PLANE_CHANGE)
-    )
+    changes = change_times(times)
     return Pool(
         tuple(chosen_from),
         changes,
@@ -304,11 +302,8 @@ def _candidate(
     own_times: OwnTimesSettings | None,
     references: References,
 ) -> Candidate:
-    set_up, reading = (
-        _or(getattr(own_times, key, None), _or(getattr(times, key), default))
-        for key, default in (("set_up", SET_UP), ("reading", READING))
-    )
-    seconds = seconds_of(position, set_up, reading, _or(times.probe_change, PROBE_CHANGE))
+    set_up, reading = durations(times, own_times)
+    seconds = seconds_of(position, set_up, reading, change_times(times).probe)
     across = "" if plane is None or references.dimension == 2 else plane
     item_settings = {
         key: value for key, value in in_lengths(item_settings, position).items() if key != "times"
@@ -324,6 +319,22 @@ def seconds_of(
 ) -> float:
     """Return the duration of a position in seconds, by default the usual one."""
     return set_up + position.count * reading + (len(position.probes) - 1) * probe_change
+
+
+def durations(times: TimesSettings, own_times: OwnTimesSettings | None) -> tuple[float, float]:
+    """Return the seconds to set a position up, and those of a reading: its own, those of its file,
+    or the usual ones.
+    """
+    set_up, reading = (
+        _or(getattr(own_times, key, None), _or(getattr(times, key), default))
+        for key, default in (("set_up", SET_UP), ("reading", READING))
+    )
+    return set_up, reading
+
+
+def change_times(times: TimesSettings) -> ChangeTimes:
+    """Return the changes between positions, by default the usual ones."""
+    return ChangeTimes(_or(times.probe_change, PROBE_CHANGE), _or(times.plane_change, PLANE_CHANGE))
 
 
 def _or(value: float | None, default: float) -> float:

@@ -138,17 +138,21 @@ def loosened(experiment: Experiment) -> float:
 
 def suggested(experiment: Experiment, prediction: Prediction, report: Report) -> Repairs:
     """Return suggestions for an experiment with its pool, whose design has this prediction."""
-    return replace(repairs(experiment, report), strategy=tuple(better_strategy(experiment)))
+    # Without the pool, which would be made anew with each strategy.
+    placed = prediction.experiment or placed_only(experiment)
+    return replace(repairs(experiment, report), strategy=tuple(better_strategy(placed)))
 
 
 def better_strategy(experiment: Experiment) -> Iterator[str]:
     """Yield lines on the longest simple strategy of no more positions and readings, if lengths are
     less uncertain with it; none otherwise.
     """
-    before = loosened(experiment)
-    positions, drafted = next(as_drafted(placed_only(experiment)), ([], None))
-    after = inf if drafted is None else loosened(drafted)
-    if drafted is None or not after < IMPROVED * before:
+    found = as_drafted(experiment)
+    if found is None:
+        return
+    positions, drafted = found
+    before, after = loosened(experiment), loosened(drafted)
+    if not after < IMPROVED * before:
         return
     own = "undetermined" if before == inf else f"{number(1e6 * before)} µm"
     if exact_offsets(experiment):

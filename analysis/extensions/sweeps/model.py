@@ -102,9 +102,11 @@ class Sweep:
         """The estimator of a cell, and those that may share its data sets with the full one; empty
         where none is compared.
         """
-        names = {choice.estimator for axis in self.axes for choice in axis.choices} | {"distances"}
         own = "".join(choice.estimator for choice in self.choices(number))
-        return (own, *(sorted(names - {"", "full"}) if own == "full" else [own])) if own else ()
+        if own != "full":
+            return (own, own) if own else ()
+        names = {choice.estimator for axis in self.axes for choice in axis.choices}
+        return (own, *sorted((names | {"distances"}) - {"", own}))
 
     def label(self, number: int) -> str:
         """Axes of a cell with their values."""

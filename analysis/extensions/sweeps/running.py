@@ -105,11 +105,12 @@ def compute_sweep(
     """
     with runner as working:
         summary = run_sweep(store, number, sweep, working, retry_failed, fail_fast, report)
-        result = stored_result(store, number)
-        found = None if summary.left else answer(result)
-        named = [] if found is None else [found.case, *result.table["cell"][[*found.outstanding]]]
-        for cell in dict.fromkeys(map(int, named)):
-            _assess(store, keys(store, number)[cell], working, cell)
+        if not summary.left:
+            result = stored_result(store, number)
+            found, by_cell = answer(result), keys(store, number)
+            rows = [] if found is None else [found.best[0], *found.outstanding]
+            for cell in dict.fromkeys(map(int, result.table["cell"][rows])):
+                _assess(store, by_cell[cell], working, cell)
     ensure_in_place(store)
     return summary
 

@@ -46,7 +46,7 @@ def written_sweep(
 def _values(axes: Mapping[str, Any]) -> Iterator[tuple[str, Node]]:
     """Yield the paths of axes with each of their values."""
     for axis in axes.values():
-        paths = axis.get("paths") or [axis[key] for key in ("path",) if key in axis]
+        paths = axis.get("paths") or filter(None, [axis.get("path")])
         columns = axis.get("together") or dict.fromkeys(paths, axis.get("values", ()))
         for path, values in columns.items():
             for value in values.values() if isinstance(values, Mapping) else values:
@@ -64,8 +64,8 @@ def sweep_of(
     :raises ExperimentError: a value cannot be written, or a file cannot be copied.
     """
     swept: dict[str, Any] = {}
-    more: dict[str, Any] = {}
-    plan = dict(content.get("plan", {}))
+    content = {"title": experiment.title, **content, "axes": swept}
+    plan = dict(content.pop("plan", {}))
     for key, stated in axes.items():
         paths = [key] if isinstance(key, str) else list(key)
         values = stated.tolist() if hasattr(stated, "tolist") else stated
@@ -81,7 +81,7 @@ def sweep_of(
         if key == "hours":
             plan[key] = [hours if isinstance(hours, str) else f"{hours} h" for hours in rows]
         elif key == "estimator":
-            more[key] = values
+            content[key] = values
         elif is_limit and not any(is_row):
             plan[key] = values if isinstance(values, str) else rows
         elif len(paths) > 1 and all(is_row):
@@ -96,7 +96,6 @@ def sweep_of(
             name = " ".join(paths)
             name = f"{name} stated" if is_reserved(name) else name
             swept[name] = {"paths": paths, "values": values}
-    content = {"title": experiment.title, **content, **more, "axes": swept}
     content |= {"plan": plan} if plan else {}
     design = yaml_text(to_list(to_python(experiment.tree))).encode()
     try:
