@@ -10,7 +10,6 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 from ballplate.simulator.inputs.number_arrays import Array
@@ -42,10 +41,6 @@ class SplineError(ValueError):
         super().__init__(
             "; ".join(problem.told(lambda place: f"{place:g}") for problem in self.problems)
         )
-
-
-Side = Literal["above", "below"]
-"""From which side a derivative is taken where it jumps."""
 
 
 @dataclass(frozen=True)
@@ -137,9 +132,9 @@ class SplineSpace:
             coefficients[:, k] = self._spline(start, nu=k) / factorial  # type: ignore[operator]
         return coefficients
 
-    def rows(self, x: Array, derivative: int = 0, side: Side = "above") -> Array:
+    def rows(self, x: Array, derivative: int = 0) -> Array:
         """Return the B-splines' values or derivatives at x (m,), as (m, count), per metre or
-        radian to the power `derivative`.
+        radian to the power `derivative`; where one jumps, that of the piece above.
 
         :raises SplineError: an x beyond the ends of the curve.
         """
@@ -155,8 +150,7 @@ class SplineSpace:
             )
         if derivative >= self.order:
             return np.zeros((len(x), self.count))
-        # At a break the piece above or below it is taken, of which the derivative is wanted.
-        piece = np.searchsorted(self.breaks, x, "right" if side == "above" else "left") - 1
+        piece = np.searchsorted(self.breaks, x, "right") - 1
         piece = np.clip(piece, 0, len(self.breaks) - 2)
         u = ((x - self.breaks[piece]) / self.length)[:, None]
         row_values = np.zeros((len(x), self.count))
@@ -168,52 +162,28 @@ class SplineSpace:
         return row_values / self.length**derivative
 
 
-# With fewer points between a knot and a boundary the curvature, which jumps there, is hardly
-# determined.
-NEXT_TO_BOUNDARY = 3
+def at_every(x: Array, r: int, lower: float, upper: float) -> tuple[float, ...]:
+    """Return knots at every r-th of the points x between the ends, as in NISTIR 6517, equation (5).
 
-
-def at_every(
-    x: Array, r: int, lower: float, upper: float, boundaries: Sequence[float] = ()
-) -> tuple[float, ...]:
-    """Return knots at every r-th of the points x between neighbouring boundaries, as in NISTIR
-    6517, equation (5).
-
-    A knot without a point of its feature beyond it would be undetermined, and is omitted. So is
-    one with fewer than three points from it to a boundary, the knot's own not counted. Points of
-    the same x count as one, a point on a boundary in both features.
+    A knot without a point beyond it would be undetermined, and is omitted. Points of the same x
+    count as one.
 
     >>> at_every(np.arange(1.0, 9.0), 3, 1.0, 8.0)
     (3.0, 6.0)
-    >>> at_every(np.arange(1.0, 17.0), 3, 1.0, 16.0, [8.0])
-    (3.0, 13.0)
-    >>> at_every(np.arange(1.0, 17.0), 5, 1.0, 16.0, [8.0])
-    (5.0, 12.0)
     """
     distinct = np.unique(x)
-    knots_found = []
-    ends = [lower, *boundaries, upper]
-    for start, end in zip(ends, ends[1:], strict=False):
-        inside = distinct[(distinct >= start) & (distinct <= end)]
-        before = 0 if start == lower else NEXT_TO_BOUNDARY
-        beyond = 1 if end == upper else NEXT_TO_BOUNDARY
-        chosen = range(r - 1, len(inside) - beyond, r)
-        knots_found += [float(inside[k]) for k in chosen if k >= before and start < inside[k] < end]
-    return tuple(knots_found)
+    inside = distinct[(distinct >= lower) & (distinct <= upper)].tolist()
+    return tuple(knot for knot in inside[r - 1 : -1 : r] if lower < knot < upper)
 
 
 def with_boundaries(
-    knots: Sequence[float],
-    boundaries: Sequence[float],
-    order: int,
-    corners: Sequence[float] = (),
+    knots: Sequence[float], boundaries: Sequence[float], order: int
 ) -> tuple[float, ...]:
     """Return all knots in order, with multiplicities for continuous value and slope at the
-    boundaries, and no continuity at the corners.
+    boundaries.
 
     >>> with_boundaries((1.0, 3.0), (2.0,), 4)
     (1.0, 2.0, 2.0, 3.0)
     """
     doubled = [boundary for boundary in boundaries for _ in range(order - 2)]
-    broken = [corner for corner in corners for _ in range(order)]
-    return tuple(sorted([*knots, *doubled, *broken]))
+    return tuple(sorted([*knots, *doubled]))

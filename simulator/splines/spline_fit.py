@@ -17,7 +17,7 @@ from ballplate.simulator.computing.numerics import svd
 from ballplate.simulator.inputs.number_arrays import Array
 from ballplate.simulator.inputs.settings import number_of
 
-from .space import Side, SplineError, SplineProblem, SplineSpace
+from .space import SplineError, SplineProblem, SplineSpace
 
 NAMES = ("value", "slope", "second derivative", "third derivative")
 
@@ -41,12 +41,6 @@ class Constraint:
         """
         known = self.derivative < len(NAMES)
         return NAMES[self.derivative] if known else f"derivative {self.derivative}"
-
-
-def straight(space: SplineSpace, lower: float, upper: float) -> tuple[Constraint, ...]:
-    """Return the conditions of a straight line: no curvature in any piece between two points."""
-    starts = [place for place in space.breaks[:-1].tolist() if lower <= place < upper]
-    return tuple(Constraint(place, k) for place in starts for k in range(2, space.order))
 
 
 def rows(space: SplineSpace, constraints: tuple[Constraint, ...]) -> tuple[Array, Array]:
@@ -97,19 +91,19 @@ class SplineFit:
         """Points more than free coefficients."""
         return len(self.x) - self.free
 
-    def values(self, x: Array, derivative: int = 0, side: Side = "above") -> Array:
+    def values(self, x: Array, derivative: int = 0) -> Array:
         """The curve or a derivative at x (m,).
 
         :raises SplineError: an x beyond the ends.
         """
-        return self.space.rows(x, derivative, side) @ self.coefficients
+        return self.space.rows(x, derivative) @ self.coefficients
 
-    def spread(self, x: Array, derivative: int = 0, side: Side = "above") -> Array:
+    def spread(self, x: Array, derivative: int = 0) -> Array:
         """Standard uncertainty of the curve or a derivative at x (m,) for sigma 1.
 
         :raises SplineError: an x beyond the ends.
         """
-        return np.linalg.norm(self.space.rows(x, derivative, side) @ self.root, axis=1)
+        return np.linalg.norm(self.space.rows(x, derivative) @ self.root, axis=1)
 
     @cached_property
     def residuals(self) -> Array:

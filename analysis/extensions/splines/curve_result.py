@@ -8,30 +8,16 @@ from argparse import Namespace
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from ballplate.presentation import Data, MainTable, Result, aligned, picked, records
 from ballplate.simulator.computing import comparable
-from ballplate.simulator.inputs import (
-    CsvWriter,
-    ExperimentError,
-    Message,
-    listing,
-    number_of,
-    refused,
-)
+from ballplate.simulator.inputs import CsvWriter, ExperimentError, Message, number_of
 from ballplate.simulator.machines import Array
 from ballplate.simulator.splines import SplineError, pieces
 
-from .compensated_points import compensated_csv
-from .error_curve import SIDES, ErrorCurve, fit_curve
-from .error_curve_plots import draw_curve, draw_whiskers
-from .profile import Profile
+from .error_curve import ErrorCurve, fit_curve
 from .read_points import choose_points, read_points
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 MOST_LISTED = 12
 # What adds less to the curve than this part of its size is rounding.
@@ -76,7 +62,7 @@ class FittedCurve(Result):
             "knots": space.knots,
             "start": space.lower,
             "end": space.upper,
-            **picked(curve, "boundaries", "corners", "coverage_factor"),
+            "coverage_factor": curve.coverage_factor,
             **picked(fitted, "sigma", "degrees_of_freedom", "sum_of_squares"),
             "prescribed": [picked(held, "at", "derivative", "value") for held in curve.prescribed],
             "free_coefficients": fitted.free,
@@ -122,43 +108,6 @@ class FittedCurve(Result):
             writer.writerow([repr(value) for value in (start, end, *polynomial.tolist())])
         return text.getvalue()
 
-    def compensated(self) -> str:
-        """The points of the curve moved against its errors, and its corners, as CSV.
-
-        :raises ExperimentError: there is no profile, or a corner is hardly one.
-        """
-        try:
-            return compensated_csv(self.curve, self._profile())
-        except SplineError as error:
-            raise _placed(error, self.file) from None
-
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """Points, curve, its expanded uncertainty, knots and boundaries.
-
-        With a path, which ends in .svg, .png or .pdf, the picture is written as well.
-
-        :raises ImportError: matplotlib is missing.
-        :raises ValueError: the path ends in something else.
-        """
-        return draw_curve(self.curve, self.title, path)
-
-    def plot_whiskers(self, path: str | Path | None = None) -> Figure:
-        """The errors of the points as bars normal to their profile.
-
-        :raises ImportError: matplotlib is missing.
-        :raises ValueError: the path ends in something else.
-        :raises ExperimentError: there is no profile.
-        """
-        return draw_whiskers(self.curve, self._profile(), path)
-
-    def _profile(self) -> Profile:
-        if self.curve.profile is None:
-            text = (
-                "errors are normal to a profile whose arc length is the abscissa; add the columns"
-            )
-            raise refused(self.file, f"{text} nominal_x_mm and nominal_z_mm, and leave --x out")
-        return self.curve.profile
-
     def _variable(self) -> str:
         start = " less the start of the piece" if self.local else ""
         return f"{self.curve.points.x_name.replace('_', ' ')}{start}"
@@ -187,26 +136,14 @@ def _curve_lines(curve: ErrorCurve, heading: str) -> list[str]:
     lines = [
         f"{heading}, {len(fitted.x)} points, curve from {mm(space.lower)} to {mm(space.upper)}"
     ]
-    knots = ", ".join(f"{1e3 * knot:.6g}" for knot in curve.knots[:MOST_LISTED])
-    more = f" and {len(curve.knots) - MOST_LISTED} more" if len(curve.knots) > MOST_LISTED else ""
+    knots = ", ".join(f"{1e3 * knot:.6g}" for knot in space.knots[:MOST_LISTED])
+    more = f" and {len(space.knots) - MOST_LISTED} more" if len(space.knots) > MOST_LISTED else ""
     where = f" at {knots} mm{more}" if knots else ""
     lines.append(
-        f"cubic spline, {number_of(len(curve.knots), 'knot')}{where};"
+        f"cubic spline, {number_of(len(space.knots), 'knot')}{where};"
         f" {number_of(fitted.free, 'free coefficient')},"
         f" {fitted.degrees_of_freedom} degrees of freedom"
     )
-    lines += [f"features share value and slope at {mm(place)}" for place in curve.boundaries]
-    for corner in curve.corners:
-        sides = [um(fitted.values(np.array([corner]), 0, side)[0], 4) for side in SIDES]
-        lines.append(
-            f"features meet at a corner at {mm(corner)}, with errors {' and '.join(sides)}"
-        )
-    if len(set(points.features)) > 1 and not curve.boundaries and not curve.corners:
-        names = listing(dict.fromkeys(points.features))
-        lines.append(
-            f"one curve over {names}: the column feature makes no boundaries; --boundary does"
-        )
-    lines += [f"feature {k} is a straight line" for k in curve.straight]
     for held in curve.prescribed:
         value = held.value * FACTORS[held.derivative] + 0.0
         amount = f"{value:.6g} {UNITS[held.derivative]}" if value else "0"

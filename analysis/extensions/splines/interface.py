@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from argparse import ArgumentError, ArgumentParser
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,10 +17,10 @@ def spline(file: PathLike, **wanted: Any) -> FittedCurve:
     """A spline with prescribed values and slopes through the measured errors of a CSV file.
 
     What curve is `wanted` is said as by the options of `ballplate spline`: x, y, points, every,
-    knots, start, end, boundary, corner, straight, start_value, start_slope, end_value, end_slope
-    and powers, in texts with units; options that may be repeated are lists.
+    knots, start, end, start_value, start_slope, end_value, end_slope and powers, in texts with
+    units.
 
-    :raises TypeError: another name, or no list where one is needed.
+    :raises TypeError: another name.
     :raises ValueError: a value that the command refuses.
 
     >>> import ballplate as bp
@@ -40,12 +39,8 @@ def spline(file: PathLike, **wanted: Any) -> FittedCurve:
     for name, value in wanted.items():
         if name not in defaults:
             raise TypeError(f'"{name}" is unknown; {hint(name, defaults)}')
-        values = [] if value is None else [value]
-        if isinstance(defaults[name], list):
-            if isinstance(value, str) or not isinstance(value, Sequence):
-                raise TypeError(f"{name}={value!r}; give a list")
-            values = list(value)
-        arguments += [f"--{name.replace('_', '-')}={given}" for given in values]
+        if value is not None:
+            arguments.append(f"--{name.replace('_', '-')}={value}")
     try:
         return error_curve(Path(file), parser.parse_args(arguments))
     except ArgumentError as error:

@@ -5,13 +5,11 @@ from __future__ import annotations
 import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from ballplate.cli import (
     UsageError,
     add_force,
     add_output,
-    add_picture,
     argument_type,
     count,
     print_json,
@@ -19,16 +17,11 @@ from ballplate.cli import (
     write,
 )
 
-if TYPE_CHECKING:
-    from ballplate.presentation import Writer
-
 DESCRIPTION = (
     "Fit a cubic spline to errors along an axis or along the profile of a turned part, by least"
     " squares, with values and slopes prescribed at its ends, and write it as polynomials for a"
     " controller. The file has columns such as position_mm and error_um, or nominal_x_mm and"
     " nominal_z_mm for a profile, whose arc length is then the abscissa; also point and feature."
-    ' A LOCATION is an abscissa such as "12.5 mm", or nominal co-ordinates on the profile such as'
-    ' "37.084 mm, -37.084 mm".'
 )
 
 
@@ -53,15 +46,11 @@ def slope(text: str) -> float:
 
 
 @argument_type
-def location(text: str) -> float | tuple[float, float]:
-    """Argument type: an abscissa, or radius and axial co-ordinate on a profile."""
+def abscissa(text: str) -> float:
+    """Argument type: an abscissa."""
     from ballplate.simulator.inputs import parse_length
 
-    first, *others = map(parse_length, text.split(","))
-    if len(others) > 1:
-        fact = "should be one abscissa, or two nominal co-ordinates on a profile"
-        raise ValueError(f'"{text}" {fact}')
-    return (first, others[0]) if others else first
+    return parse_length(text)
 
 
 @argument_type
@@ -92,38 +81,18 @@ def add_curve(parser: ArgumentParser) -> None:
         metavar="R",
         type=count,
         default=5,
-        help="a knot at every R-th point of each feature; default: 5",
+        help="a knot at every R-th point; default: 5",
     )
     knots.add_argument(
-        "--knots", metavar="LOCATIONS", type=abscissae, help='such as "10 mm, 20 mm", or none'
+        "--knots", metavar="ABSCISSAE", type=abscissae, help='such as "10 mm, 20 mm", or none'
     )
     for end, point in (("start", "first"), ("end", "last")):
         shape.add_argument(
             f"--{end}",
-            metavar="LOCATION",
-            type=location,
+            metavar="ABSCISSA",
+            type=abscissa,
             help=f"{end} of the curve; default: {point} point",
         )
-    for option, between in (
-        ("--boundary", "between features that share value and slope"),
-        ("--corner", "between features that share only their location"),
-    ):
-        shape.add_argument(
-            option,
-            metavar="LOCATION",
-            type=location,
-            action="append",
-            default=[],
-            help=f"{between}; may be repeated",
-        )
-    shape.add_argument(
-        "--straight",
-        metavar="K",
-        type=count,
-        action="append",
-        default=[],
-        help="the K-th feature is a straight line; may be repeated",
-    )
     prescribed = parser.add_argument_group("prescribed")
     for end in ("start", "end"):
         prescribed.add_argument(
@@ -161,37 +130,20 @@ def add_options(parser: ArgumentParser) -> None:
         takes_screen=True,
         help="write the polynomials as CSV; - for the screen",
     )
-    add_output(
-        output,
-        "--compensated",
-        metavar="CSV",
-        help="write the points of the profile moved against their errors, and its corners",
-    )
-    add_picture(output, "--plot", help="draw points and curve (.svg, .png or .pdf)")
-    add_picture(
-        output, "--whiskers", help="draw errors as bars normal to the profile (.svg, .png or .pdf)"
-    )
     add_force(output)
     output.add_argument("--json", action="store_true", help="print JSON in metres")
 
 
 def run(options: Namespace) -> int:
-    """Fit, print and draw."""
+    """Fit, print and write."""
     from .curve_result import error_curve
 
     is_screen = str(options.output) == "-"
     if options.json and is_screen:
         raise UsageError("--json and -o - both go to the screen; name a file for one")
     curve = error_curve(options.file, options)
-    contents: dict[Path | None, Writer | str] = {
-        options.plot: curve.plot,
-        options.whiskers: curve.plot_whiskers,
-    }
-    if options.compensated is not None:
-        contents[options.compensated] = curve.compensated()
     if not is_screen:
-        contents[options.output] = curve.coefficients()
-    write(options, contents)
+        write(options, {options.output: curve.coefficients()})
     if options.json:
         print_json([curve.to_dict()])
     elif is_screen:
