@@ -52,15 +52,6 @@ def add_options(parser: ArgumentParser) -> None:
         ),
     )
     parser.add_argument(
-        "--fix",
-        action="store_true",
-        help=(
-            "write the first repair that --suggest finds for a deficient design, without a"
-            " certificate or a probe that the file does not state, into its file, leave the rest of"
-            " the file unchanged, and check the file again"
-        ),
-    )
-    parser.add_argument(
         "--goal",
         action="append",
         default=[],
@@ -96,20 +87,15 @@ def run(options: Namespace) -> int:
     from ballplate.results.checked_files import Wanted, check_files
 
     goals = _goals(options)
-    wanted = Wanted(
-        goals, options.fail_weak, options.suggest or options.fix, not options.no_modules
-    )
+    wanted = Wanted(goals, options.fail_weak, options.suggest, not options.no_modules)
     paths = matching_files(options.files)
     if options.format == "junit":
         # Refused before the work where its extension is missing.
         service("junit_report")
-    files, statuses = [], [AS_EXPECTED]
+    files = []
     with progress(options) as shown:
         for checked in check_files(paths, options.variant, wanted, shown.show):
             shown.step_aside()
-            if options.fix:
-                checked, status = service("with_repairs")(checked, wanted, options)
-                statuses.append(status)
             files.append(checked)
             _print(checked, options)
             if not wanted.repairs and options.format == "text":
@@ -121,9 +107,7 @@ def run(options: Namespace) -> int:
         print_json([checked_design.prediction.to_dict() for checked_design in designs])
     if any(checked.messages for checked in files):
         return BAD_FILE
-    if not all(checked.as_expected for checked in files):
-        statuses.append(NOT_AS_EXPECTED)
-    return max(statuses)
+    return AS_EXPECTED if all(checked.as_expected for checked in files) else NOT_AS_EXPECTED
 
 
 def _name_suggestions(checked: CheckedFile, options: Namespace) -> None:

@@ -1,4 +1,4 @@
-"""Repairs written into an experiment's file, with the text about them kept."""
+"""Changes of an experiment written into its file, with the text about them kept."""
 
 from __future__ import annotations
 
@@ -6,14 +6,11 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from ballplate.results import check
 from ballplate.simulator.experiment import Experiment, load, place_of
 from ballplate.simulator.inputs import (
-    UNKNOWN,
     Mapping as MappingNode,
     Node,
     Steps,
-    Trust,
     format_path,
     mark_of,
     parse_tree,
@@ -21,8 +18,6 @@ from ballplate.simulator.inputs import (
     written,
 )
 
-from .changes import changed
-from .repairs import Repair
 from .written import Edit, edits, lacks_probes, position_settings
 from .yamltext import TextChange, changed_data, with_changes
 
@@ -30,70 +25,16 @@ PLACEMENT = ("plane", "level", "corner", "centre", "quarter_turns", "pose")
 READINGS = ("probes", "balls", "repeats", "standard_uncertainty", "readings")
 
 
-def mended(
-    text: str, source: Path, variant: str | None, repair: Repair, trust: Trust = UNKNOWN
-) -> str:
-    """Return the text of an experiment's file with a repair; values that a variant inherits are
-    changed for that variant alone.
-
-    The new text is loaded and its rank computed.
-
-    :raises ExperimentError: writing the repair would change neighbouring text, or text that aliases
-        refer to.
-    """
-    loaded = load(source, True, trust, text)
-    (experiment,) = (
-        loaded_experiment for loaded_experiment in loaded if loaded_experiment.name == variant
-    )
-    after = changed(experiment, repair.changes)
-    # Nothing is left undetermined, whatever the file expected until now.
-    extra = (
-        [TextChange(("expected_rank_deficiency",), 0)]
-        if experiment.expected_rank_deficiency
-        else []
-    )
-    extra += _taken_from_pool(experiment, repair)
-    new = with_experiment(text, source, experiment, after, repair.edits, extra)
-    (checked,) = (
-        loaded_experiment
-        for loaded_experiment in load(source, False, trust, new)
-        if loaded_experiment.name == variant
-    )
-    verdict = check(checked).verdict
-    if verdict.deficiency or len(verdict.weak) > repair.weak:
-        text = "the repaired file does not have the computed rank; the file is unchanged"
-        raise experiment.refused((), text)
-    return new
-
-
-def _taken_from_pool(experiment: Experiment, repair: Repair) -> Iterator[TextChange]:
-    """Remove chosen candidates from the pool, as in the present experiment."""
-    settings, pool = to_python(experiment.tree).get("pool") or {}, experiment.pool
-    indices = [change.candidate for change in repair.changes if change.candidate >= 0]
-    in_pool = {pool.candidates[k].name for k in indices} if pool is not None else set()
-    for key in ("candidates", "calibration"):
-        entries = settings.get(key) or ()
-        gone = [k for k, entry in enumerate(entries) if str(entry.get("name")) in in_pool]
-        if gone and len(gone) == len(entries):
-            yield TextChange(("pool", key), [])
-            continue
-        for k in reversed(gone):
-            yield TextChange(("pool", key, k), kind="remove")
-
-
 def with_experiment(
     text: str,
     source: Path,
     experiment: Experiment,
     changed: Experiment,
-    needed: Iterable[Edit] | None = None,
-    extra: Iterable[TextChange] = (),
 ) -> str:
     """Return the text of an experiment's file with the changes of the experiment; values that a
     variant inherits are changed for that variant alone.
 
-    `needed` are the edits, if known, and `extra` further changes. An experiment that was loaded
-    with its faults may have some afterwards.
+    An experiment that was loaded with its faults may have some afterwards.
 
     :raises ExperimentError: writing would change neighbouring text, or text that aliases refer to.
     """
@@ -106,15 +47,7 @@ def with_experiment(
         }
     # A variant with more entries of a list has a list of its own, in which the others are changed.
     changes = sorted(
-        [
-            *changes_of(experiment, edits(experiment, changed) if needed is None else needed),
-            *extra,
-        ],
-        # What the pool no longer offers is left out last, so that the others keep their numbers.
-        key=lambda change: (
-            change.steps[0] == "pool" and len(change.steps) < 4,
-            len(change.steps),
-        ),
+        changes_of(experiment, edits(experiment, changed)), key=lambda change: len(change.steps)
     )
     new = with_text_changes(text, source, experiment.name, changes)
     after = {
@@ -246,7 +179,7 @@ def _in_file(root: Node, variant: str, change: TextChange) -> TextChange:
         if own_place[: len(whole)] == tuple(map(str, whole)):
             mark = mark_of(root, ("variants", variant, path), of_key=True)
             place_text = format_path(whole)
-            text = f"the repair changes {place_text}, which includes this; write it by hand"
+            text = f"the change concerns {place_text}, which includes this; write it by hand"
             raise mark.refused(text, format_path(("variants", variant)))
     settings: Any = changed_data(to_python(root), change)
     for step in whole:

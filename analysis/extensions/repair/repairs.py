@@ -7,12 +7,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ballplate.presentation import Data, finite, given, number, picked
-from ballplate.rank import Verdict, length
+from ballplate.rank import length
 from ballplate.results import Prediction, given_words, qualification_data
 from ballplate.uncertainty import OFFSET_TRIAL, exact_offsets
 
 from .candidates import duration
-from .changes import Change, ChangeKind
+from .changes import Change
 from .written import Edit
 
 
@@ -48,11 +48,6 @@ class Repair:
         """The smallest singular value of determined directions."""
         values = self.prediction.verdict.singular_values
         return float(values[len(values) - self.deficiency - 1])
-
-    @property
-    def invents(self) -> bool:
-        """True if it needs a certificate or a probe that the file does not state."""
-        return any(change.kind is ChangeKind.CERTIFICATE for change in self.changes)
 
     @property
     def order(self) -> tuple[bool, bool, bool]:
@@ -124,16 +119,6 @@ class Repairs:
     repairs: tuple[Repair, ...] = ()
     reason: str = ""
     strategy: tuple[str, ...] = ()
-
-    def to_write(self, judged: Verdict, nothing_weak: bool = False) -> Repair | None:
-        """Return the best repair that may be written without a question, unless the design needs
-        none; with `nothing_weak` a weakly determined design needs one too.
-        """
-        for repair in self.repairs if judged.deficiency or nothing_weak else ():
-            is_enough = judged.deficiency or not repair.weak
-            if is_enough and not repair.deficiency and not repair.invents:
-                return repair
-        return None
 
     def lines(self) -> list[str]:
         """Return lines of each repair, with its change of the file."""
