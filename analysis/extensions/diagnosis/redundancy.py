@@ -14,7 +14,7 @@ from ballplate.simulator.computing import (
     unreported,
 )
 from ballplate.simulator.design import Design, measured
-from ballplate.simulator.estimation import Parameters, linearise
+from ballplate.simulator.estimation import Coordinates, Distances, linearise
 from ballplate.simulator.experiment import Experiment, lay_out
 from ballplate.simulator.machines import Integers
 from ballplate.uncertainty import QUANTITIES, functions_of
@@ -90,7 +90,7 @@ def reliability_of(
         symbol: [
             changes_of(linearisation, group, biases)
             for group in groups
-            if not isinstance(group, Parameters)
+            if isinstance(group, Coordinates | Distances)
         ]
         for symbol, groups in functions.items()
     }

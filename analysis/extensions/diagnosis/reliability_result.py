@@ -11,7 +11,7 @@ import numpy as np
 from ballplate.presentation import SHOWN, Data, Result, aligned, number, picked, table_lines
 from ballplate.simulator.computing import comparable
 from ballplate.simulator.design import Design
-from ballplate.simulator.estimation import Coordinates, Functions, Parameters
+from ballplate.simulator.estimation import Coordinates, Distances, Functions
 from ballplate.simulator.geometry import AXIS_NAMES
 from ballplate.simulator.inputs import listed
 from ballplate.simulator.machines import Array, Integers
@@ -451,7 +451,7 @@ def function_name(design: Design, functions: Functions, first: int, second: int)
     """Return the name of a co-ordinate from its point's label and its axis, or of a distance from
     both labels.
     """
-    assert not isinstance(functions, Parameters)
+    assert isinstance(functions, Coordinates | Distances)
     places = functions.places
     if isinstance(functions, Coordinates):
         return f"{places.name(design, first)} {AXIS_NAMES[second]}"

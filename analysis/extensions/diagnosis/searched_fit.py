@@ -10,8 +10,8 @@ from ballplate.simulator.inputs import Mark
 from ballplate.simulator.machines import Array
 
 from .assumptions_tested import assumptions_tested
+from .exact_values import searched_with_exact_values
 from .findings import Diagnosis
-from .refits import searched_with_refits
 from .remainders import too_many_entries
 from .wording import findings
 
@@ -24,7 +24,7 @@ def diagnosed(
     the readings in their file.
     """
     untested = too_many_entries(at.design)
-    search = None if untested else searched_with_refits(at, x, sigma_is_estimated)
+    search = None if untested else searched_with_exact_values(at, x, sigma_is_estimated)
     if search is None:
         return Diagnosis(), untested
     return Diagnosis(tuple(findings(search, marks)), tuple(assumptions_tested(search))), ""

@@ -10,7 +10,6 @@ from ballplate.simulator.design import SLIGHTLY, Design, Lengths, Readings
 from ballplate.simulator.inputs import ExperimentError, Mark, Message, format_length
 from ballplate.simulator.machines import Array
 
-from .exchanged_positions import mistaken_positions, words_of_mistaken
 from .gross_errors import WrongPosition, WrongReading, find_gross_errors
 from .length_ratios import LengthRatio, doubtful_lengths
 from .plate_sizes import words_of_size
@@ -30,10 +29,6 @@ def refuse_gross_errors(design: Design, x: Array, marks: Sequence[Mark]) -> None
     positions, readings = find_gross_errors(design, x)
     if (positions or readings) and (size := words_of_size(design, x)):
         raise marks[0].refused(size)
-    if positions:
-        mistaken = mistaken_positions(design, x)
-        if {wrong.position for wrong in positions} <= set(mistaken):
-            raise marks[0].refused(words_of_mistaken(design, mistaken))
     unexplained = [wrong.reading for wrong in readings if wrong.is_unexplained]
     if len(unexplained) > FEW * len(design.readings):
         text = (

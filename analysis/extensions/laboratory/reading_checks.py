@@ -9,7 +9,6 @@ from ballplate.simulator.inputs import Mark
 from ballplate.simulator.machines import Array
 
 from .coordinate_kinds import as_scale_readings, said_of
-from .exchanged_positions import mistaken_positions, words_of_mistaken
 from .gross_error_messages import (
     doubts_about_lengths,
     doubts_about_volume,
@@ -23,9 +22,8 @@ def doubts_about_readings(design: Design, x: Array, marks: Sequence[Mark]) -> tu
     """Return possible but improbable properties of scale readings (readings, d): positions,
     lengths, locations.
     """
-    exchanged = words_of_mistaken(design, mistaken_positions(design, x))
     return (
-        *filter(None, (exchanged, words_of_size(design, x))),
+        *filter(None, (words_of_size(design, x),)),
         *doubts_about_lengths(design, x),
         *doubts_about_volume(design, x, marks),
     )

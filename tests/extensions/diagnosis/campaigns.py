@@ -16,9 +16,9 @@ import numpy as np
 from ballplate.extensions.diagnosis.bias_patterns import LinearisedDesign, patterns
 from ballplate.extensions.diagnosis.cause_search import FAMILY, Search
 from ballplate.extensions.diagnosis.events import cause, event_groups
+from ballplate.extensions.diagnosis.exact_values import searched_with_exact_values
 from ballplate.extensions.diagnosis.hypotheses import CHAIN, MODEL, PossibleCause
 from ballplate.extensions.diagnosis.power import noncentrality
-from ballplate.extensions.diagnosis.refits import searched_with_refits
 from ballplate.extensions.diagnosis.remainders import Columns, leftover
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.estimation.linearisation import linearise
@@ -461,7 +461,7 @@ def rates(world: World, error: str, count: int, first: int = 0) -> Counter[str]:
             continue
         solution = estimate(case.observed.design, case.observed.x)
         at = linearised_fit(case.observed.design, solution)
-        names = named(searched_with_refits(at, case.observed.x, True))
+        names = named(searched_with_exact_values(at, case.observed.x, True))
         word = outcome(case, error in OF_MODEL, names)
         found[word] += 1
         found["large"] += case.times > 2.0

