@@ -6,7 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -22,7 +21,7 @@ from ballplate.simulator.inputs.extensions import optional_service, service
 from ballplate.simulator.inputs.settings import hint, number_of
 from ballplate.simulator.machines.protocol import Unit
 from ballplate.uncertainty.scale import Scale, scale_of
-from ballplate.uncertainty.summaries import Quantity, TaskUncertainty, tasks_of, uncertainties
+from ballplate.uncertainty.summaries import Quantity, tasks_of, uncertainties
 
 from .extension_results import PredictedAssumptions
 from .qualifications import Qualification, given_words, qualification_data, qualifications_of
@@ -34,8 +33,6 @@ from .text_blocks import (
     scale_data,
     scale_lines,
     target_lines,
-    task_data,
-    task_table,
     uncertainty_table,
     verdict_data,
     verdict_lines,
@@ -45,7 +42,7 @@ if TYPE_CHECKING:
     import pandas
     from ballplate.montecarlo.experiments import Trials
     from ballplate.presentation.table_columns import MainTable
-    from matplotlib.figure import Figure
+    from ballplate.uncertainty.named_values import NamedUncertainty
 
 # Rows of a table; displacements of single readings may be thousands.
 MOST_LINES = 30
@@ -175,7 +172,7 @@ class Prediction(Result):
         return found.to_frame().set_index("error")
 
     @property
-    def tasks(self) -> tuple[TaskUncertainty, ...]:
+    def tasks(self) -> tuple[NamedUncertainty, ...]:
         """The measuring tasks."""
         return tasks_of(self.quantities)
 
@@ -208,18 +205,25 @@ class Prediction(Result):
             return lines
         lines += ["", *uncertainty_table(self.quantities), *qualified]
         lines += ["", *influence_table(self.influences)] if self.influences else []
-        lines += ["", *task_table(self.tasks)] if self.tasks else []
+        from ._named_tables import named_lines
+
+        lines += named_lines(self.design, self.quantities)
         return lines if self.assumptions is None else [*lines, "", *self.assumptions.summary()]
 
     def data(self) -> Data:
+        named = {}
+        if self.quantities:
+            from ._named_tables import named_data
+
+            named = named_data(self.design, self.quantities)
         data = {
             **self.named,
             **verdict_data(self.verdict),
             "sigma": 1.0,
             "quantities": quantities_data(self.quantities),
+            **named,
             **given(
                 lengths=None if self.quantities else self.lengths and quantity_data(self.lengths),
-                tasks=task_data(self.tasks),
                 influences=influence_data(self.influences),
             ),
             "scale": scale_data(self.scale),
@@ -245,18 +249,6 @@ class Prediction(Result):
         'm'
         """
         return by_label(self.quantities, symbol)
-
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """Draw the positions in the volume, labelled by names or, if there are many, by numbers,
-        and write the picture to the path, if given: a name in .svg, .png or .pdf.
-
-        :raises ImportError: matplotlib is missing.
-        :raises ValueError: another suffix.
-        """
-        from ballplate.presentation.pictures import draw_design
-
-        names = ", ".join(self.design.positions.names)
-        return draw_design(self.design, f"{self.title}: positions {names} in the volume", path)
 
     def columns(self) -> MainTable:
         """One row for each of U1 to U6; without these, one with the rank and U6."""
@@ -320,7 +312,7 @@ class PlannedUncertainty:
     quantities: dict[str, Quantity]
 
     @property
-    def tasks(self) -> tuple[TaskUncertainty, ...]:
+    def tasks(self) -> tuple[NamedUncertainty, ...]:
         return tasks_of(self.quantities)
 
 

@@ -195,7 +195,7 @@ def _fitted(experiment: Experiment, observed: ObservedReadings) -> tuple[Fit | N
 
 
 def _symbols(goal: Goal) -> set[str]:
-    more = {"tasks": "tasks", "quantity": goal.symbol.split()[0]}.get(goal.kind, "U6")
+    more = {"lengths": "U6", "quantity": goal.symbol.split()[0]}.get(goal.kind, goal.kind)
     return {"U6", more}
 
 

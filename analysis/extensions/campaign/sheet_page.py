@@ -3,25 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from importlib.metadata import version
 
 import numpy as np
 from ballplate.presentation import escaped
-from ballplate.simulator.experiment import Experiment, lay_out
+from ballplate.simulator.experiment import Experiment
 from ballplate.simulator.geometry import ball_coordinates
 from ballplate.simulator.inputs import number_of
 
-from ..planning import RunSheet, Step, position_of, price, summary, times, with_chosen
+from ..planning import RunSheet, Step, position_of, price, summary, times
 from .reading_lists import sequence
-from .sheet_drawing import volume_drawing
 
 # To be written in by hand: at the head of a sheet, and in each position.
 BLANKS = ("machine", "operator", "date", "temperature, start", "temperature, end", "readings in")
 NOTES = ("begun", "ended", "temperature", "remarks")
-
-# A name longer than this is replaced by a number in the drawing.
-LONGEST_NAME = 9
 
 STYLE = """
 :root { color-scheme: light; }
@@ -44,9 +39,6 @@ td, th { padding: 0.2em 0.8em 0.2em 0; border-bottom: 1px solid #ddd; vertical-a
 th { white-space: nowrap; }
 tr { break-inside: avoid; }
 .wide { overflow-x: auto; }
-figure { margin: 0; max-width: 100%; break-inside: avoid; }
-figcaption { color: #555; }
-svg { display: block; max-width: 100%; height: auto; }
 .step { border-top: 2px solid #222; padding: 0.6em 0 0.8em; margin-top: 1.2em;
   break-inside: avoid; }
 .step.done { color: #777; }
@@ -75,16 +67,12 @@ ol.balls i { display: inline-block; width: 0.8em; height: 0.8em; border: 1px sol
   .step .fields { grid-template-columns: 1fr 1fr 1fr 2fr; }
   .wide { overflow: visible; }
   .change { background: none; }
-  svg.volume { max-height: 112mm; }
 }
 """
 
 
 def sheet_page(sheet: RunSheet, experiment: Experiment, title: str) -> str:
-    """The run sheet as a page of HTML: the head, the order, styli, the volume, and each position.
-
-    `experiment` has the artefacts and the volume.
-    """
+    """The run sheet as a page of HTML: the head, the order, styli, and each position."""
     steps = list(enumerate(sheet.steps, 1))
     timed = ["start", "min"] if sheet.timed else []
     rows = [
@@ -105,7 +93,6 @@ def sheet_page(sheet: RunSheet, experiment: Experiment, title: str) -> str:
         _table(["", "position", "probes", "readings", *timed], rows),
         "<h2>Styli</h2>",
         _table(*_styli(sheet, experiment)),
-        _volume(sheet, experiment),
         *(_step(number, step, sheet, experiment) for number, step in steps),
     ]
     if sheet.calibration:
@@ -178,21 +165,6 @@ def _styli(sheet: RunSheet, experiment: Experiment) -> tuple[list[str], list[lis
         rows.append([probe.name, *lengths, ", ".join(angles), ""])
     axes = [f"{axis}, mm" for axis in "xyz"[: experiment.dimension]]
     return ["probe", *axes, "A, B of the head", "diameter of the tip"], rows
-
-
-def _volume(sheet: RunSheet, experiment: Experiment) -> str:
-    """The positions in the volume."""
-    # Where things stand does not depend on what disturbs their readings.
-    design = lay_out(with_chosen(replace(experiment, influences=()), sheet.written))
-    numbers = {step.name: str(number) for number, step in enumerate(sheet.steps, 1)}
-    names = {
-        name: name if len(name) <= LONGEST_NAME else number for name, number in numbers.items()
-    }
-    more = "; a number replaces a long name" if set(names.values()) != set(names) else ""
-    return (
-        f"<h2>Positions in the volume</h2><figure>{volume_drawing(design, names)}"
-        f"<figcaption>the dot is the first ball of each position{more}</figcaption></figure>"
-    )
 
 
 def _step(number: int, step: Step, sheet: RunSheet, experiment: Experiment) -> str:

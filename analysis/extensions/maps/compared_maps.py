@@ -242,7 +242,7 @@ def expected_map(
     """
     described = Volumetric(machine)
     model = described.truth.model
-    temperature, deviations = described.lasting
+    temperature, deviations = described.random.lasting, described.random.sizes
     names = [parameter.name for parameter in model.parameters]
     root = np.zeros((len(names), len(deviations)))
     for k, (field, deviation) in enumerate(zip(temperature.fields, deviations, strict=True)):

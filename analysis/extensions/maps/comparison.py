@@ -41,13 +41,11 @@ class FrameMotion:
 
 @dataclass(frozen=True, eq=False)
 class MapComparison:
-    """All that is compared: `lengths` in groups, errors at `points` (n, d) after the `motion` was
-    taken out, error functions, plates, and the test of the map as a whole.
+    """All that is compared: `lengths` in groups, errors at points after the `motion` was taken
+    out, error functions, plates, and the test of the map as a whole.
     """
 
-    volume: Volume
     probe: str
-    points: Array
     motion: FrameMotion
     lengths: tuple[FigureGroup, ...]
     places: FigureGroup
@@ -110,9 +108,7 @@ def compared(
     functions, why = _functions(first, second, k)
     count = max(LEAST_POINTS, *(len(side.values) for side in (first, second)))
     return MapComparison(
-        volume,
         probe,
-        points,
         FrameMotion(MOTIONS[len(middle)], motion.values, motion.standard_uncertainties()),
         tuple(lengths),
         remainder.group("errors at points of the volume", "m", names, k),

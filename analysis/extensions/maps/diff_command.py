@@ -10,7 +10,6 @@ from ballplate.cli import (
     add_force,
     add_json,
     add_output,
-    add_picture,
     complain,
     coverage_factor,
     day,
@@ -95,7 +94,6 @@ def add_options(parser: ArgumentParser) -> None:
         "--fail", action="store_true", help="end with exit status 1 if a change is shown"
     )
     add_output(parser, "-o", "--output", metavar="FILE", help="write one row per value")
-    add_picture(parser, "--plot", help="draw the changes, and all E_n")
     add_force(parser)
     add_json(parser)
 
@@ -136,7 +134,7 @@ def run(options: Namespace) -> int:
         )
     except (NotComparableError, QuantityError) as error:
         raise UsageError(error) from None
-    write(options, {options.output: difference.to_csv, options.plot: difference.plot})
+    write(options, {options.output: difference.to_csv})
     show(options, difference)
     for note in difference.notes:
         complain(note)

@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import date
 from functools import cached_property
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from ballplate.presentation import Data, Result, aligned, number, picked, records, table_lines
@@ -22,9 +21,6 @@ from .campaign_tests import TOO_ALIKE, TOO_RARE, JointDifference
 from .compared_maps import ComparedMap, positions_in_common
 from .comparison import MapComparison
 from .normalised_errors import FigureGroup
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 # Chance below which a joint test shows a change.
 LEVEL = 0.05
@@ -318,19 +314,6 @@ class MapDifference(Result):
         if self.years:
             rows = [row | {"per year": row["difference"] / self.years} for row in rows]
         return rows
-
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """Draw differences at points of the volume as magnified vectors, and E_n of lengths and
-        error functions.
-
-        A path in .svg, .png or .pdf saves the plot.
-
-        :raises ImportError: matplotlib is missing.
-        :raises ValueError: the path ends in something else.
-        """
-        from .difference_plots import draw_difference
-
-        return draw_difference(self.comparison, f"{self.label}: {self.headline()}", path)
 
 
 def _chance(p: float) -> str:

@@ -15,7 +15,6 @@ import pytest
 from ballplate.cli import main
 from ballplate.extensions.campaign.reading_lists import planned_readings
 from ballplate.extensions.campaign.sheet import Sheet, sheet_of
-from ballplate.presentation.scenes import hull
 from ballplate.simulator.experiment.loading import load
 from ballplate.simulator.inputs.messages import ExperimentError
 
@@ -144,41 +143,6 @@ def test_angles_of_a_head_are_those_of_the_file(tmp_path: Path) -> None:
     flat = re.sub(r"<[^>]*>|\|", " ", sheet_of(load(path)[0]).page())
     assert re.search(r"down\s+0\s+0\s+-40\s", flat)
     assert re.search(r"right\s+30\s+\S+\s+\S+\s+90°, 90°", flat)
-
-
-def test_positions_in_the_volume_are_named_with_a_dot_at_their_first_balls(sheet: Sheet) -> None:
-    """The drawing fills its frame; axes are named outside of the volume, positions beyond the
-    middle of their outlines.
-    """
-    page = sheet.page()
-    drawing = page[page.index('<svg class="volume"') : page.index("</svg>")]
-    edges, outlines = (
-        [
-            np.array([point.split(",") for point in points.split()], float)
-            for points in re.findall(rf'<{tag} points="(.*?)"', drawing)
-        ]
-        for tag in ("polyline", "polygon")
-    )
-    size = np.array(re.findall(r'viewBox="0 0 (\S+) (\S+)"', drawing)[0], float)
-    every = np.concatenate([*edges, *outlines])
-    np.testing.assert_allclose(every.min(axis=0), 34.0, atol=0.6)
-    np.testing.assert_allclose(every.max(axis=0), size - 34.0, atol=0.6)
-    assert size[0] <= 660.0 and (size - [660.0, 68.0 + 495.0]).max() == 0.0
-    dots = np.array(re.findall(r'<circle cx="(.*?)" cy="(.*?)" r="4"', drawing), float)
-    texts = re.findall(r'<text x="(.*?)" y="(.*?)".*?>(.*?)</text>', drawing)
-    places = np.array([text[:2] for text in texts], float) - [0.0, 4.0]
-    told = [text for *_, text in texts]
-    assert ((places > 0.0) & (places < size)).all()
-    assert told[:9] == ["0", "x, mm", "600", "0", "y, mm", "500", "0", "z, mm", "450"]
-    for ends in places[:9].reshape(3, 3, 2):
-        np.testing.assert_allclose(ends[1], 0.5 * (ends[0] + ends[2]), atol=0.11)
-        assert ends[1] in hull(np.concatenate([*edges, ends[1:2]]))
-    # A name of ten letters is told by its number.
-    assert set(told[9:]) == {"flat low", "P2", "3", "short bar"}
-    for name, outline, dot in zip(places[9:], outlines, dots, strict=True):
-        assert np.linalg.norm(outline - dot, axis=1).min() < 0.11
-        middle = outline.mean(axis=0)
-        np.testing.assert_allclose(name - middle, 0.3 * (middle - dot), atol=0.2)
 
 
 def test_each_position_tells_where_its_first_and_last_balls_are(sheet: Sheet) -> None:
