@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from ballplate.simulator.computing.processes import single_threaded
@@ -18,7 +19,7 @@ from ballplate.simulator.estimation.initial import initial_state
 from ballplate.simulator.estimation.linearisation import Linearisation, linearise
 from ballplate.simulator.inputs.number_arrays import Array, Integers
 from ballplate.simulator.machines.protocol import ErrorModel
-from ballplate.simulator.readings.simulated import true_readings
+from ballplate.simulator.readings.simulated import random_displacements, true_readings
 
 from ._expansion import Direct, LocalModel, expand
 
@@ -68,12 +69,13 @@ class PositionReadings:
 class Reference:
     """Common parts of all replicates.
 
-    The plates' readings, `order` (m,) among the design's, are in the order of `groups`; `noise` (d,
-    m) is the standard uncertainty of each. `ends` are the model at the first and second read ends
-    of length standards, with `end_noise` (d, ends) and `end_difference` (m, d), their difference at
-    the reference; models are expanded about readings if `is_expanded`. `rows` are those of each
-    type of observation about the truth. `start` is the estimate from readings without noise.
-    Directions that the nominal design `drawn` leaves undetermined are held; None without any.
+    The readings, `order` (m,) among the design's, are the plates' in the order of `groups`, then
+    those of length standards; `noise` (d, m) is the standard uncertainty of each. `ends` are the
+    model at the first and second read ends of length standards, with `end_difference` (m, d), their
+    difference at the reference; models are expanded about readings if `is_expanded`. `rows` are
+    those of each type of observation about the truth. `start` is the estimate from readings without
+    noise. Directions that the nominal design `drawn` leaves undetermined are held; None without
+    any.
     """
 
     design: Design
@@ -85,7 +87,6 @@ class Reference:
     order: Integers
     groups: tuple[PositionReadings, ...]
     ends: tuple[LocalModel, LocalModel] | None
-    end_noise: tuple[Array, Array]
     end_difference: Array
     is_expanded: bool
     rows: tuple[Rows, ...]
@@ -99,8 +100,13 @@ class Reference:
 
     @property
     def position(self) -> Integers:
-        """Positions (m,) of the plates' readings, in the order of the groups."""
+        """Positions (m,) of the readings, in their order."""
         return self.design.readings.position[self.order]
+
+    @cached_property
+    def place(self) -> Integers:
+        """Places (m,) of the design's readings in the order."""
+        return np.argsort(self.order)
 
     @property
     def linearisation(self) -> Linearisation:
@@ -154,7 +160,7 @@ def reference(design: Design, truth: Truth) -> Reference:
     start, plates = solution.state, observed.plate_readings
     p = start.probes[readings.probe]
     is_expanded = _is_faithful(
-        observed, solution.spectrum, solution.factor.layout.model, start, exact
+        observed, solution.spectrum, solution.factor.layout.model, start, exact, truth
     )
 
     def local(x: Array, p: Array) -> LocalModel:
@@ -184,14 +190,15 @@ def reference(design: Design, truth: Truth) -> Reference:
             )
         )
         row += len(chosen)
-    order = np.concatenate([np.arange(0), *indices])
+    others = np.setdiff1d(np.arange(len(readings)), plates)
+    order = np.concatenate([plates[np.concatenate([np.arange(0), *indices])], others])
     lengths = observed.of(Lengths)
     is_read = ~lengths.to_pivot
     first, second = lengths.first, lengths.second[is_read]
     ends = None
     if len(lengths):
         ends = local(exact[first], p[first]), local(exact[second], p[second])
-    difference, end_noise = np.zeros((len(lengths), observed.dimension)), []
+    difference = np.zeros((len(lengths), observed.dimension))
     for sign, end, of_end in (
         (1.0, first, np.arange(len(lengths))),
         (-1.0, second, np.flatnonzero(is_read)),
@@ -200,7 +207,6 @@ def reference(design: Design, truth: Truth) -> Reference:
             difference[of_end] += sign * (
                 exact[end] + observed.model.error(exact[end], start.a, p[end])
             )
-        end_noise.append(reading_noise(observed, readings.select(end)).T)
     difference[~is_read] -= start.origins[readings.position[first[~is_read]]]
     return Reference(
         observed,
@@ -208,11 +214,10 @@ def reference(design: Design, truth: Truth) -> Reference:
         start,
         solution.factor,
         solution.spectrum,
-        noise[order].T,
-        plates[order],
+        reading_noise(observed, readings.select(order)).T,
+        order,
         tuple(groups),
         ends,
-        (end_noise[0], end_noise[1]),
         difference,
         is_expanded,
         tuple(kind.rows(observed, start, exact) for kind in observed.observations),
@@ -260,18 +265,30 @@ def _local_model(design: Design, a: Array, x: Array, p: Array, is_expanded: bool
     return Direct(design.model, x, a, p, design.model.error(x, a, p))
 
 
+def random_of_machine(
+    design: Design, truth: Truth, exact: Array, generator: np.random.Generator, count: int
+) -> Array:
+    """Draw displacements (count, d, m) of the design's readings by the random part of the true
+    machine's errors.
+    """
+    readings = design.readings
+    random = random_displacements(truth.model, truth.state, readings, exact, generator, count)
+    return random.swapaxes(1, 2)
+
+
 def _is_faithful(
-    design: Design, spectrum: Spectrum, columns: slice, start: State, exact: Array
+    design: Design, spectrum: Spectrum, columns: slice, start: State, exact: Array, truth: Truth
 ) -> bool:
     """Return whether an expansion of the model agrees with the model."""
     p = start.probes[design.readings.probe]
-    # Two replicates as they will occur: noise of the readings, and parameters that follow the
-    # covariance.
+    # Two replicates as they will occur: noise of the readings, random errors of the machine, and
+    # parameters that follow the covariance.
     generator = np.random.default_rng(np.random.SeedSequence(0))
     noise = reading_noise(design, design.readings).T
     moved = noise * generator.standard_normal((2, design.dimension, len(exact)))
     step = generator.standard_normal((2, spectrum.root.shape[1])) @ spectrum.root[columns].T
     offsets = 1e-6 * generator.standard_normal(moved.shape) if design.probes.free.any() else None
+    moved += random_of_machine(design, truth, exact, generator, 2)
     expanded, direct = (
         _local_model(design, start.a, exact, p, is_expanded).change(moved, step, offsets)
         for is_expanded in (True, False)
@@ -279,17 +296,14 @@ def _is_faithful(
     return bool((np.abs(expanded - direct) <= FAITHFUL * noise).all())
 
 
-def complete_fit(
-    shared: Reference, moved: Array, errors: tuple[Array, ...], ends: tuple[Array, Array]
-) -> Solution:
+def complete_fit(shared: Reference, moved: Array, errors: tuple[Array, ...]) -> Solution:
     """Estimate one replicate as `fit` does, with a separate factor in each iteration.
 
-    `moved` (d, m) is the noise of the plates' readings, `errors` (m,) those of the values of each
-    type of observation, `ends` (d, m) the noise of the readings of the lengths' two ends.
-    `GaussNewtonSettings` limits the iterations. Directions that the nominal design leaves
-    undetermined are held, as in all replicates, and no others.
+    `moved` (d, m) is the noise of the readings, `errors` (m,) those of the values of each type of
+    observation. `GaussNewtonSettings` limits the iterations. Directions that the nominal design
+    leaves undetermined are held, as in all replicates, and no others.
     """
-    design, x = replicate_data(shared, moved, errors, ends)
+    design, x = replicate_data(shared, moved, errors)
     # At full rank the spectrum of the reference has no null directions, so that none can appear by
     # noise.
     held_spectrum = shared.spectrum if shared.drawn is None else shared.drawn.spectrum
@@ -297,15 +311,11 @@ def complete_fit(
 
 
 def replicate_data(
-    shared: Reference, moved: Array, errors: tuple[Array, ...], ends: tuple[Array, Array]
+    shared: Reference, moved: Array, errors: tuple[Array, ...]
 ) -> tuple[Design, Array]:
     """Return the design with the values of one replicate, and its scale readings (m, d)."""
     design, x = shared.design, shared.exact.copy()
     x[shared.order] += moved.T
-    lengths = design.of(Lengths)
-    x[lengths.first] = shared.exact[lengths.first] + ends[0].T
-    second = lengths.second[~lengths.to_pivot]
-    x[second] = shared.exact[second] + ends[1].T
     values = (
         kind.given(value=kind.value + np.asarray(error))
         for kind, error in zip(design.observations, errors, strict=True)

@@ -24,8 +24,9 @@ from ballplate.simulator.estimation.covariance import solve_balls, solve_kept, s
 from ballplate.simulator.estimation.gauss_newton import Solution
 from ballplate.simulator.geometry.motions import cross_matrices, vector_from_rotation
 from ballplate.simulator.inputs.number_arrays import Array, Flags, Integers
+from ballplate.simulator.readings.simulated import HasRandomPart
 
-from ._reference import PositionReadings, Reference, complete_fit
+from ._reference import PositionReadings, Reference, complete_fit, random_of_machine
 
 # Replicates of a batch: constant, since the size of a matrix product affects its last bits.
 BATCH = 128
@@ -87,50 +88,42 @@ class Estimates:
 
 @dataclass(frozen=True)
 class Draw:
-    """Noise of b replicates: of the plates' readings `moved` (b, d, m), of the values of each type
-    of observation `errors` (b, m), and of the readings of the lengths' two ends (b, d, m).
+    """Noise of b replicates: of readings `moved` (b, d, m), and of the values of each type of
+    observation `errors` (b, m).
     """
 
     moved: Array
     errors: tuple[Array, ...]
-    ends: tuple[Array, Array]
 
-    def replicate(self, k: int) -> tuple[Array, tuple[Array, ...], tuple[Array, Array]]:
-        """Noise of readings (d, m), of values and of both ends of one replicate."""
-        return (
-            self.moved[k],
-            tuple(error[k] for error in self.errors),
-            (self.ends[0][k], self.ends[1][k]),
-        )
+    def replicate(self, k: int) -> tuple[Array, tuple[Array, ...]]:
+        """Noise of readings (d, m) and of values of one replicate."""
+        return self.moved[k], tuple(error[k] for error in self.errors)
 
     def select(self, chosen: Integers | Flags) -> Draw:
-        errors, (first, second) = tuple(error[chosen] for error in self.errors), self.ends
-        return Draw(self.moved[chosen], errors, (first[chosen], second[chosen]))
+        return Draw(self.moved[chosen], tuple(error[chosen] for error in self.errors))
 
 
 def draw(shared: Reference, seed: int, batch: int) -> Draw:
-    """Draw the noise of one batch."""
+    """Draw the noise of one batch, with the random part of the true machine's errors."""
     generator = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(batch,)))
     design = shared.design
-    shape = (BATCH, *shared.noise.shape)
+
     # Always a whole batch, also if fewer replicates are wanted: a replicate has the same noise in a
     # run of any length.
-    moved = shared.noise * design.noise.draw(generator, shape, shared.position, 2)
+    def noise(some: slice) -> Array:
+        shape = (BATCH, *shared.noise[:, some].shape)
+        return design.noise.draw(generator, shape, shared.position[some], 2)
+
+    count = len(design.plate_readings)
+    of_plates = noise(slice(count))
     errors = tuple(kind.errors(generator, BATCH) for kind in design.observations)
-    return Draw(moved, errors, _drawn_ends(shared, generator))
-
-
-def _drawn_ends(shared: Reference, generator: np.random.Generator) -> tuple[Array, Array]:
-    """Draw the noise of the readings of lengths; a reading of several lengths is drawn once."""
-    lengths = shared.design.of(Lengths)
-    readings, index = np.unique(
-        np.concatenate([lengths.first, lengths.second[~lengths.to_pivot]]), return_inverse=True
-    )
-    shape = (BATCH, shared.design.dimension, len(readings))
-    position = shared.design.readings.position[readings]
-    drawn = shared.design.noise.draw(generator, shape, position, 2)
-    first, second = np.split(index.ravel(), [len(lengths)])
-    return drawn[:, :, first] * shared.end_noise[0], drawn[:, :, second] * shared.end_noise[1]
+    moved = np.concatenate([of_plates, noise(slice(count, None))], axis=2)
+    moved *= shared.noise
+    # Last, so that all else is drawn as on a machine without a random part.
+    if isinstance(shared.truth.model, HasRandomPart):
+        random = random_of_machine(design, shared.truth, shared.exact, generator, BATCH)
+        moved += random[:, :, shared.order]
+    return Draw(moved, errors)
 
 
 @single_threaded
@@ -291,7 +284,7 @@ def _gradient(shared: Reference, drawn: Draw, at: Deviations) -> tuple[Array, Ar
         if not isinstance(kind, Lengths):
             kind.add_misfit(rows, errors, among)
         elif shared.ends is not None:
-            _lengths(shared, drawn.ends, errors, at, squares, by_shared)
+            _lengths(shared, drawn.moved, errors, at, squares, by_shared)
     return squares, by_ball, by_shared
 
 
@@ -379,7 +372,7 @@ def _offsets(at: Deviations, probe: Integers | None) -> Array | None:
 
 def _lengths(
     shared: Reference,
-    ends: tuple[Array, Array],
+    moved: Array,
     errors: Array,
     at: Deviations,
     squares: Array,
@@ -397,6 +390,7 @@ def _lengths(
     at_ends = lengths.first, lengths.second[has_second]
     probes = [None if not design.probes.free.any() else design.readings.probe[k] for k in at_ends]
     offsets = [_offsets(at, probe) for probe in probes]
+    ends = [moved[:, :, shared.place[k]] for k in at_ends]
     difference = shared.end_difference.T + (ends[0] + first.change(ends[0], step, offsets[0]))
     difference[:, :, has_second] -= ends[1] + second.change(ends[1], step, offsets[1])
     difference[:, :, pivoted] -= at.origins[:, pivot].swapaxes(1, 2)
@@ -416,10 +410,10 @@ def _lengths(
     squares += (residual**2).sum(axis=0)
     pull = unit * white.pulled(residual).T[:, None]
     pulls = pull, pull[:, :, has_second]
-    for sign, end, moved, probe, moved_probe, end_pull in zip(
+    for sign, end, moved_end, probe, moved_probe, end_pull in zip(
         (1.0, -1.0), shared.ends, ends, probes, offsets, pulls, strict=True
     ):
-        by_shared[:, layout.model] += sign * end.gather(moved, step, end_pull, moved_probe)
+        by_shared[:, layout.model] += sign * end.gather(moved_end, step, end_pull, moved_probe)
         if probe is not None:
             _add_by_offset(by_shared, layout, probe, sign * end.gather_offsets(step, end_pull))
     for k in np.unique(pivot):

@@ -11,6 +11,7 @@ from ballplate.simulator.computing.processes import single_threaded
 from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.estimation.functions import (
     BallPlaces,
+    Combinations,
     Coordinates,
     Displacements,
     Distances,
@@ -22,6 +23,7 @@ from ballplate.simulator.estimation.functions import (
 from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.geometry.motions import vector_from_rotation
 from ballplate.simulator.inputs.number_arrays import Array, Integers
+from ballplate.uncertainty.named_values import member_root
 from ballplate.uncertainty.pairs import pairs_of
 from ballplate.uncertainty.quantities import QUANTITIES, functions_of
 
@@ -85,6 +87,8 @@ def targets(shared: Reference) -> tuple[MonteCarloQuantity, ...]:
                 quantities += [_parameters(symbol, shared, at, functions)] if has_truth else []
             elif isinstance(functions, Coordinates):
                 quantities.append(_coordinates(symbol, displaced(functions.places)))
+            elif isinstance(functions, Combinations):
+                quantities.append(_combinations(symbol, functions, displaced(functions.places)))
             else:
                 quantities.append(_distances(symbol, functions, displaced(functions.places)))
     return tuple(
@@ -199,6 +203,21 @@ def _coordinates(symbol: str, displaced: Displaced) -> MonteCarloQuantity:
     return MonteCarloQuantity(
         symbol, base, points.uncertainties.ravel(), ("m",) * len(base), change
     )
+
+
+def _combinations(symbol: str, functions: Combinations, displaced: Displaced) -> MonteCarloQuantity:
+    """Return the members of all values, which are linear."""
+    points, truly, moved = displaced
+    weights, units = functions.weights, np.repeat(functions.units, np.diff(functions.starts))
+    uncertainty = np.sqrt((member_root(functions, points) ** 2).sum(axis=1))
+
+    def change_of(replicates: Deviations) -> Array:
+        return np.asarray(
+            (weights @ moved(replicates).swapaxes(1, 2).reshape(-1, points.places.size).T).T
+        )
+
+    base = weights @ (points.places - truly).ravel()
+    return MonteCarloQuantity(symbol, base, uncertainty, tuple(units.tolist()), change_of)
 
 
 def _distances(symbol: str, functions: Distances, displaced: Displaced) -> MonteCarloQuantity:

@@ -12,8 +12,6 @@ from .checked_files import (
     CheckedDesign as CheckedDesign,
     CheckedFile as CheckedFile,
     Wanted as Wanted,
-    advised as advised,
-    check_files as check_files,
     checked_design as checked_design,
 )
 from .estimates import (

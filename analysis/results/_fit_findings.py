@@ -13,7 +13,7 @@ from ballplate.simulator.experiment.earlier_campaigns import LEAST_SIGMA
 from ballplate.simulator.inputs.extensions import service
 from ballplate.simulator.inputs.settings import listing
 from ballplate.simulator.readings.observed_readings import ObservedReadings
-from ballplate.uncertainty.summaries import Quantity, TaskUncertainty, tasks_of
+from ballplate.uncertainty.summaries import Quantity, tasks_of
 
 from .adjustments import Adjustment, few_degrees_of_freedom
 from .estimates import EstimatedFunctions, ParameterEstimate
@@ -25,6 +25,7 @@ from .text_blocks import not_read
 
 if TYPE_CHECKING:
     from ballplate.simulator.experiment.model import Experiment
+    from ballplate.uncertainty.named_values import NamedUncertainty
 
 
 @dataclass(frozen=True, repr=False)
@@ -66,7 +67,7 @@ class FitFindings(FitResult):
         return self.observed.design
 
     @property
-    def tasks(self) -> tuple[TaskUncertainty, ...]:
+    def tasks(self) -> tuple[NamedUncertainty, ...]:
         """The measuring tasks."""
         return tasks_of(self.quantities)
 

@@ -9,6 +9,7 @@ from ballplate.presentation.formatting import Data, given, picked
 from ballplate.presentation.table_columns import table_lines
 
 from ._fit_findings import FitFindings
+from ._named_tables import named_data, named_lines
 from .adjustments import adjustment_data, adjustment_lines, freedom_words
 from .estimates import ESTIMATE_COLUMNS, labels
 from .plates import plate_data, plate_table
@@ -17,8 +18,6 @@ from .text_blocks import (
     iteration_lines,
     map_lines,
     quantities_data,
-    task_data,
-    task_table,
     uncertainty_table,
     verdict_data,
     verdict_lines,
@@ -59,7 +58,8 @@ def fit_lines(fit: FitFindings) -> list[str]:
     if fit.diagnosis is not None:
         lines += ["", *fit.diagnosis.lines()]
     lines += ["", *uncertainty_table(fit.quantities, fit.lack_of_fit.caveat), ""]
-    lines += [*task_table(fit.tasks, fit.lack_of_fit.caveat), ""] if fit.tasks else []
+    named = named_lines(fit.design, fit.quantities, fit.lack_of_fit.caveat)[1:]
+    lines += [*named, ""] if named else []
     printed = [estimate for estimate in fit.estimates if estimate.kind not in ("origin", "ball")]
     lines += table_lines(ESTIMATE_COLUMNS, printed, "kind")
     quoted = fit.design.model.reported().names
@@ -93,7 +93,7 @@ def fit_data(fit: FitFindings) -> Data:
             picked(iteration, "step", "sum_of_squares") for iteration in fit.solution.iterations
         ],
         "quantities": quantities_data(fit.quantities),
-        **given(tasks=task_data(fit.tasks)),
+        **named_data(fit.design, fit.quantities),
         "largest_residuals": [
             {
                 **picked(item, "position", "ball", "probe", "axis", "value"),

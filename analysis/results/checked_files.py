@@ -28,8 +28,7 @@ WITH_MODULES = "leave --no-modules out if you trust the file"
 
 @dataclass(frozen=True)
 class CheckedDesign:
-    """Verdict on one design; `place` locates the line of the file to change, `variant` is its name
-    there.
+    """Verdict on one design; `place` locates the line of the file to change.
 
     `suggestions` are changes that would determine all parameters, if requested. `goals` state how
     each goal is met, and `missed` the goals not met and, with --fail-weak, weak directions.
@@ -40,7 +39,6 @@ class CheckedDesign:
     suggestions: AskedResult | None = None
     goals: tuple[str, ...] = ()
     missed: tuple[str, ...] = ()
-    variant: str | None = None
 
     @property
     def complaints(self) -> tuple[str, ...]:
@@ -153,19 +151,21 @@ def checked_design(
     if wanted.nothing_weak and prediction.verdict.weak:
         count = len(prediction.verdict.weak)
         missed += (number_of(count, "weakly determined direction"),)
-    checked = advised(CheckedDesign(prediction, None, suggestions, goals, missed, experiment.name))
+    checked = _advised(CheckedDesign(prediction, None, suggestions, goals, missed))
     if not checked.complaints:
         return checked
     steps: tuple[str, ...] = (
         ("expected_rank_deficiency",) if prediction.verdict.complaint else ("target_uncertainty",)
     )
     # The line of the file that a complaint is about, as far as there is one.
-    if not prediction.verdict.complaint and {goal.kind for goal in wanted.goals} == {"tasks"}:
-        steps = ("evaluation", "tasks")
+    kinds = {goal.kind for goal in wanted.goals}
+    if not prediction.verdict.complaint and len(kinds) == 1:
+        own = {"tasks": ("evaluation", "tasks"), "dimensions": ("part",)}
+        steps = own.get(kinds.pop(), steps)
     return replace(checked, place=experiment.place(steps))
 
 
-def advised(design: CheckedDesign) -> CheckedDesign:
+def _advised(design: CheckedDesign) -> CheckedDesign:
     """Return a design with the goals its prediction meets, and suggestions."""
     prediction = design.prediction
     lines = [*design.goals]

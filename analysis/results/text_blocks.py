@@ -19,7 +19,7 @@ from ballplate.rank.verdicts import GREAT, Verdict
 from ballplate.simulator.computing.numerics import printable
 from ballplate.simulator.inputs.settings import listing, number_of
 from ballplate.uncertainty.scale import Scale
-from ballplate.uncertainty.summaries import Quantity, TaskUncertainty, is_determined
+from ballplate.uncertainty.summaries import Quantity
 
 if TYPE_CHECKING:
     from ballplate.simulator.estimation.gauss_newton import Iteration
@@ -75,47 +75,6 @@ def uncertainty_table(quantities: dict[str, Quantity], caveat: str = "") -> list
                 f" {quantity.symbol}{caveat}"
             )
     return lines
-
-
-def task_table(tasks: Sequence[TaskUncertainty], caveat: str = "") -> list[str]:
-    """Return measuring tasks as lines of text; a `caveat` follows the target's uncertainty."""
-    from ballplate.presentation.table_columns import table_lines
-
-    columns = {
-        "task": "name",
-        "length, mm": ("length", 6),
-        "standard uncertainty, µm": "standard_uncertainty",
-        f"expanded (k = {tasks[0].expansion:g}), µm": "expanded_uncertainty",
-        "target, µm": "target",
-        "within target": _judged,
-    }
-    with_target = any(task.target is not None for task in tasks)
-    uncertainty = next(
-        (uncertainty_words(task.coverage_factor) for task in tasks if task.target is not None), ""
-    )
-    note = [f"(the target is compared with the {uncertainty}{caveat})"] if with_target else []
-    return [*table_lines(columns, tasks), *note]
-
-
-def _judged(task: TaskUncertainty) -> str:
-    if not is_determined(task):
-        return "undetermined"
-    return "" if task.is_within is None else "yes" if task.is_within else "no"
-
-
-def task_data(tasks: Sequence[TaskUncertainty]) -> Data:
-    """Return measuring tasks as plain data in metres."""
-    return {
-        task.name: {
-            **picked(task, "length", "standard_uncertainty", "expanded_uncertainty"),
-            "coverage_factor": task.expansion,
-            "target": task.target,
-            **({} if task.target is None else {"target_coverage_factor": task.coverage_factor}),
-            "within_target": task.is_within,
-            "unit": "m",
-        }
-        for task in tasks
-    }
 
 
 def verdict_lines(

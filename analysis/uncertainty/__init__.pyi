@@ -1,4 +1,11 @@
 # Public names of this package, each loaded from its module when it is first used.
+from .named_values import (
+    FRACTIONS as FRACTIONS,
+    NamedUncertainty as NamedUncertainty,
+    combined_uncertainties as combined_uncertainties,
+    expansion as expansion,
+    member_root as member_root,
+)
 from .pairs import (
     open_above as open_above,
     pair_tiles as pair_tiles,
@@ -10,6 +17,7 @@ from .quantities import (
     QUANTITIES as QUANTITIES,
     RECORDED as RECORDED,
     RECORDED_IF_TOLD as RECORDED_IF_TOLD,
+    QuantityKind as QuantityKind,
     evaluation_points as evaluation_points,
     functions_of as functions_of,
 )
@@ -23,9 +31,4 @@ from .scale import (
     stretches as stretches,
     with_offsets as with_offsets,
 )
-from .summaries import (
-    Quantity as Quantity,
-    expansion as expansion,
-    summarise as summarise,
-    uncertainties as uncertainties,
-)
+from .summaries import Quantity as Quantity, summarise as summarise, uncertainties as uncertainties

@@ -14,13 +14,14 @@ from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.design.parameters import SharedLayout
 from ballplate.simulator.estimation.functions import (
     BallPlaces,
+    Combinations,
     Coordinates,
     Distances,
     Functions,
     MeasuredPoints,
     Parameters,
 )
-from ballplate.simulator.inputs.extensions import UnusableError, names, provided
+from ballplate.simulator.inputs.extensions import UnusableError, names, provided, provider
 from ballplate.simulator.inputs.settings import shorten
 from ballplate.simulator.machines.arrangement import SQUARENESS_ERRORS
 from ballplate.simulator.machines.protocol import Unit
@@ -32,8 +33,9 @@ class QuantityKind:
 
     Several groups of functions belong to one quantity, such as distances of several artefacts; no
     group means that the design lacks the quantity. `parts` split it by unit, each with a word and a
-    description; `unit` is that of the whole. `are_lengths` marks quantities of distances only,
-    which a plan can minimise, `about_balls` those between balls. `effect` names the changes in
+    description; `unit` is that of the whole. `are_lengths` marks quantities that a plan
+    can minimise, distances or combinations, `about_balls` those between balls, `by_limits` those
+    that it minimises as shares of limits. `effect` names the changes in
     reliability, if any. `has_target`: compared with the file's target uncertainty; `in_replicates`:
     followed by Monte Carlo; `is_recorded`: recorded by sweeps by default; `one_by_one`: printed for
     each of its `Parameters`. `needs` is missing in a design without it.
@@ -47,6 +49,7 @@ class QuantityKind:
     unit: str = ""
     are_lengths: bool = False
     about_balls: bool = False
+    by_limits: bool = False
     effect: str = ""
     has_target: bool = False
     in_replicates: bool = True
@@ -193,7 +196,9 @@ def _of_extension(symbol: str) -> QuantityKind:
 
 
 QUANTITIES: dict[str, QuantityKind] = KERNEL_QUANTITIES | {
-    symbol: _of_extension(symbol) for symbol in names("quantities", with_registered=True)
+    symbol: _of_extension(symbol)
+    for symbol in names("quantities", with_registered=True)
+    if (found := provider("quantities", symbol)) is not None and found.is_installed
 }
 
 
@@ -216,11 +221,12 @@ def functions_of(symbol: str, design: Design, layout: SharedLayout) -> tuple[Fun
 def _fault_of(kind: QuantityKind, groups: object) -> str:
     """Return a contradiction between a quantity and its functions, or an empty text."""
     if not isinstance(groups, tuple) or not all(isinstance(group, Functions) for group in groups):
-        return f"give a tuple of Parameters, Coordinates or Distances, not {shorten(repr(groups))}"
+        known = "Parameters, Coordinates, Distances or Combinations"
+        return f"give a tuple of {known}, not {shorten(repr(groups))}"
     types = {type(group) for group in groups}
-    if kind.are_lengths and types - {Distances}:
-        return "are_lengths applies to Distances only; remove it"
-    if kind.effect and Parameters in types:
+    if kind.are_lengths and types - {Distances, Combinations}:
+        return "are_lengths applies to Distances and Combinations only; remove it"
+    if kind.effect and types - {Distances, Coordinates}:
         return "effect applies to Distances and Coordinates only; remove it"
     # Only one group of names is shown.
     if len(groups) > 1 and not all(

@@ -4,9 +4,9 @@ tasks.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from ballplate.simulator.computing.numerics import first_largest
@@ -14,6 +14,7 @@ from ballplate.simulator.computing.processes import single_threaded
 from ballplate.simulator.design.arrays import Design
 from ballplate.simulator.estimation.functions import (
     BallPlaces,
+    Combinations,
     Coordinates,
     Displacements,
     Distances,
@@ -27,76 +28,11 @@ from ballplate.simulator.estimation.linearisation import Linearisation
 from ballplate.simulator.inputs.number_arrays import Array
 from ballplate.simulator.inputs.quantities import Target
 
-from .pairs import COVERAGE, PairSummary, PairTile, all_pairs, pairs_of
+from .pairs import PairSummary, all_pairs
 from .quantities import DESCRIPTIONS, QUANTITIES, evaluation_points, functions_of
 
-
-@dataclass(frozen=True)
-class TaskUncertainty:
-    """A measuring task: its length, standard uncertainty and target, in metres.
-
-    The standard uncertainty is NaN if undetermined; `target`, if any, is compared with
-    `coverage_factor` times the standard uncertainty.
-    """
-
-    name: str
-    length: float
-    standard_uncertainty: float
-    target: float | None
-    coverage_factor: float = 1.0
-
-    @property
-    def expanded_uncertainty(self) -> float:
-        """Expanded uncertainty with the target's coverage factor, or 2 if that is 1."""
-        return self.expansion * self.standard_uncertainty
-
-    @property
-    def expansion(self) -> float:
-        """Coverage factor of the expanded uncertainty."""
-        return expansion(self.coverage_factor)
-
-    @property
-    def is_within(self) -> bool | None:
-        """Whether the uncertainty is within its target; None without target."""
-        return (
-            None
-            if self.target is None
-            else self.coverage_factor * self.standard_uncertainty <= self.target
-        )
-
-
-def expansion(coverage_factor: float) -> float:
-    """Return the coverage factor of printed expanded uncertainties: the target's, or 2 if that is
-    1.
-    """
-    return coverage_factor if coverage_factor > 1.0 else COVERAGE
-
-
-def task_uncertainties(
-    distances: Distances, tile: PairTile, sigma: float = 1.0
-) -> tuple[TaskUncertainty, ...]:
-    """Return standard uncertainties of named distances, which are the pairs of a tile.
-
-    `sigma` multiplies all stated uncertainties.
-    """
-    values = sigma * np.where(tile.is_open, np.nan, tile.uncertainties)
-    targets = distances.targets or (None,) * len(distances.names)
-    rows = zip(distances.names, tile.lengths.tolist(), values.tolist(), targets, strict=True)
-    return tuple(
-        (
-            TaskUncertainty(name, length, value, None)
-            if target is None
-            else TaskUncertainty(
-                name, length, value, float(target.stated.at(length)), target.coverage_factor
-            )
-        )
-        for name, length, value, target in rows
-    )
-
-
-def is_determined(task: TaskUncertainty) -> bool:
-    """Return whether the observations determine the task's length."""
-    return not math.isnan(task.standard_uncertainty)
+if TYPE_CHECKING:
+    from .named_values import NamedUncertainty
 
 
 @dataclass(frozen=True)
@@ -122,7 +58,7 @@ class Quantity:
     coverage_factor: float = 1.0
     places: tuple[str, ...] = ()
     pair: tuple[int, int] | None = None
-    named: tuple[TaskUncertainty, ...] = field(default=(), repr=False)
+    named: tuple[NamedUncertainty, ...] = field(default=(), repr=False)
     parameters: tuple[tuple[str, float], ...] = field(default=(), repr=False)
 
     @property
@@ -169,10 +105,11 @@ def uncertainties(
             quantities |= _of_parameters(at, symbol, first, sigma)
         elif isinstance(first, Coordinates):
             quantities[symbol] = _of_coordinates(at, symbol, first.places, displaced, sigma)
-        elif first.pairs is not None:
-            quantities[symbol] = _of_named(
-                symbol, first, pairs_of(displaced(first.places), first.pairs), sigma
-            )
+        elif isinstance(first, Combinations) or first.pairs is not None:
+            from .named_values import named_values
+
+            named = named_values(first, displaced(first.places), sigma)
+            quantities[symbol] = _of_named(symbol, named)
         else:
             groups = [
                 (group.places, displaced(group.places))
@@ -186,7 +123,7 @@ def uncertainties(
     return quantities
 
 
-def tasks_of(quantities: Mapping[str, Quantity]) -> tuple[TaskUncertainty, ...]:
+def tasks_of(quantities: Mapping[str, Quantity]) -> tuple[NamedUncertainty, ...]:
     """Return the measuring tasks."""
     return quantities["tasks"].named if "tasks" in quantities else ()
 
@@ -230,16 +167,15 @@ def _of_coordinates(
     return replace(quantity, places=(_point(places, first_largest(values) // at.design.dimension),))
 
 
-def _of_named(symbol: str, distances: Distances, tile: PairTile, sigma: float) -> Quantity:
-    """Return the quantity of distances with names, each compared with its own target."""
-    named = task_uncertainties(distances, tile, sigma)
-    values = np.array([task.standard_uncertainty for task in named])
-    quantity = replace(summarise(symbol, values, "m", distances.names.__getitem__), named=named)
-    verdicts = [task.is_within for task in named if task.is_within is not None]
-    if not verdicts:
-        return quantity
-    share = sum(verdicts) / len(verdicts)
-    return replace(quantity, within_target=share, coverage_factor=named[0].coverage_factor)
+def _of_named(symbol: str, named: tuple[NamedUncertainty, ...]) -> Quantity:
+    """Return the quantity of values with names, each compared with its own target."""
+    values = np.array([value.standard_uncertainty for value in named])
+    units = ", ".join(dict.fromkeys(value.unit for value in named))
+    quantity = summarise(symbol, values, units, lambda index: named[index].name)
+    verdicts = [value.is_within for value in named if value.is_within is not None]
+    share = sum(verdicts) / len(verdicts) if verdicts else None
+    factor = named[0].coverage_factor if verdicts else 1.0
+    return replace(quantity, named=named, within_target=share, coverage_factor=factor)
 
 
 def _of_pairs(

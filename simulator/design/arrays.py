@@ -5,8 +5,8 @@ units.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar, Self, TypeVar, cast
@@ -41,7 +41,8 @@ class Design:
     `model` is the error model whose parameters are estimated. Balls and positions of length
     standards are in the same lists as those of plates: balls and poses of plates are parameters,
     and the pivots of Bryan gauges, the origins of their positions. `observations` are all others
-    than readings of plates, one object per class, in the order of their rows.
+    than readings of plates, one object per class, in the order of their rows. `sections` are
+    entries of the file under keys that extensions provide.
     """
 
     model: ErrorModel
@@ -57,6 +58,7 @@ class Design:
     tasks: Tasks
     influences: tuple[Influence, ...] = ()
     noise: Noise = Noise()
+    sections: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def dimension(self) -> int:

@@ -3,6 +3,7 @@ from .covariance import MICROMETRE as MICROMETRE, RANK_TOLERANCE as RANK_TOLERAN
 from .elimination import ALIKE as ALIKE, ROWS_AT_ONCE as ROWS_AT_ONCE
 from .functions import (
     BallPlaces as BallPlaces,
+    Combinations as Combinations,
     Coordinates as Coordinates,
     Displacements as Displacements,
     Distances as Distances,

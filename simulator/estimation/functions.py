@@ -1,5 +1,5 @@
-"""Functions of a design's parameters whose uncertainties are evaluated: parameters, points and
-distances.
+"""Functions of a design's parameters whose uncertainties are evaluated: parameters, points,
+distances, and combinations of points.
 
 They are described without numbers of a particular state, so that a plan, a fit, replicates and a
 search for gross errors can each derive theirs from the same description.
@@ -7,8 +7,9 @@ search for gross errors can each derive theirs from the same description.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from ballplate.simulator.computing.numerics import blank
@@ -56,6 +57,9 @@ def correction_rows(
         ][:, :, estimated]
     return rows
 
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 # Places whose derivatives by all shared parameters are formed at once.
 PLACES_AT_ONCE = 1000
@@ -141,6 +145,10 @@ class Coordinates:
 
     places: Places
 
+    def along(self, where: Array, rows: Array) -> Array:
+        """Derivatives of the co-ordinates, from those of the places (n, d, s)."""
+        return rows.reshape(-1, rows.shape[2])
+
 
 @dataclass(frozen=True, eq=False)
 class Distances:
@@ -172,8 +180,45 @@ class Distances:
         if not is_right or (count and not 0 <= self.pairs.min() <= self.pairs.max() <= most):
             raise ValueError(f"Distances has pairs that are not (m, 2) of places 0 to {most}")
 
+    def along(self, where: Array, rows: Array) -> Array:
+        """Derivatives (m, s) of the distances between places `where` (n, d), from those of the
+        places (n, d, s).
+        """
+        first, second = np.triu_indices(len(where), 1) if self.pairs is None else self.pairs.T
+        unit = where[first] - where[second]
+        unit /= np.sqrt((unit**2).sum(axis=1))[:, None]
+        return np.asarray(np.einsum("md,mds->ms", unit, rows[first] - rows[second]))
 
-Functions = Parameters | Coordinates | Distances
+
+@dataclass(frozen=True, eq=False)
+class Combinations:
+    """Named values, each a linear combination of co-ordinates of `places`, or a function of a few.
+
+    `weights` (k, n d) are derivatives of all members by the co-ordinates. Value i has the members
+    from `starts[i]` to `starts[i + 1]`; its error is the only one, or `of_members[i]` of several
+    (b, m) at once: (b, c), at its nominal size and perhaps at other ones, such as a limit.
+    `outside` (k, q) is a root of the members' covariance by what no estimate reduces and its sigma
+    does not scale. `sizes` (v,) are in `units`, targets are optional, and `allowed` (k,) are the
+    standard uncertainties by the estimate alone at which members keep a limit, NaN without one.
+    """
+
+    places: MeasuredPoints
+    weights: csr_array
+    outside: csr_array
+    starts: Integers
+    of_members: tuple[Callable[[Array], Array] | None, ...]
+    names: tuple[str, ...]
+    units: tuple[Unit, ...]
+    sizes: Array
+    targets: tuple[Target | None, ...]
+    allowed: Array
+
+    def along(self, where: Array, rows: Array) -> Array:
+        """Derivatives (k, s) of the members, from those of the places (n, d, s)."""
+        return np.asarray(self.weights @ rows.reshape(-1, rows.shape[2]))
+
+
+Functions = Parameters | Coordinates | Distances | Combinations
 
 
 def coordinate_name(design: Design, places: Places, index: int) -> str:
@@ -326,13 +371,7 @@ def _derivatives(
         by_balls = np.zeros((n, d, len(design.balls.places), d))
         by_balls[np.arange(n)[:, None], np.arange(d), places.index[:, None], np.arange(d)] = 1.0
     by_all = np.concatenate([by_shared, by_balls.reshape(n, d, -1)], axis=2)
-    if isinstance(functions, Coordinates):
-        by_parameter = by_all.reshape(n * d, -1)
-    else:
-        first, second = np.triu_indices(n, 1) if functions.pairs is None else functions.pairs.T
-        unit = where[first] - where[second]
-        unit /= np.sqrt((unit**2).sum(axis=1))[:, None]
-        by_parameter = np.einsum("md,mds->ms", unit, by_all[first] - by_all[second])
+    by_parameter = functions.along(where, by_all)
     shared, balls = (
         by_parameter[:, : len(linearisation.layout)],
         by_parameter[:, len(linearisation.layout) :],

@@ -195,12 +195,17 @@ def _explain(
 
 
 def _unknown_key(steps: Steps, root: Node, schema: Schema) -> Explanation:
+    used = written_keys(root, *steps[:-1])
+    forms = _schemas_at(schema, root, steps[:-1])
+    # Of several forms those are meant that have most of the keys they need.
+    needed = [len({*form.get("required", ())}.intersection(used)) for form in forms]
     keys = [
         key
-        for part in _schemas_at(schema, root, steps[:-1])
-        for key in part.get("properties", part.get("propertyNames", {}).get("enum", ()))
+        for form, count in zip(forms, needed, strict=True)
+        if count == max(needed)
+        for key in form.get("properties", form.get("propertyNames", {}).get("enum", ()))
+        if key != steps[-1]
     ]
-    used = written_keys(root, *steps[:-1])
     free = [key for key in dict.fromkeys(keys) if key not in used]
     # The file may also have the key that was misspelt.
     advice = hint(str(steps[-1]), keys)

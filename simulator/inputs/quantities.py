@@ -296,7 +296,8 @@ def _number_and_factor(value: object, kind: str) -> tuple[str, Fraction]:
     about = KINDS[kind]
     write = f'write for example "{about.example}"'
     if isinstance(value, int | float) and not isinstance(value, bool):
-        if not math.isfinite(value):
+        # Of any integer, also one that is no float.
+        if not -math.inf < value < math.inf:
             raise QuantityError(f"{value} is not a finite {kind}; {write}")
         raise QuantityError(f'"{value}" has no unit; {_with_unit(str(value), kind)}')
     if not isinstance(value, str):

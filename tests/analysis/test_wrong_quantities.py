@@ -64,7 +64,7 @@ WRONG = [
     (no_tuple, {}, "give a tuple"),
     (no_name, {}, "1 pairs, 0 names and 0 targets"),
     (no_point, {}, "not (m, 2) of places 0 to 199"),
-    (coordinates, {"are_lengths": True}, "are_lengths applies to Distances only"),
+    (coordinates, {"are_lengths": True}, "are_lengths applies to Distances and Combinations only"),
     (two, {}, "combine all in one"),
     (parameters, {}, "1 names and 1 units"),
     (one_parameter, {"effect": "something"}, "effect applies to"),

@@ -205,8 +205,8 @@ def alone(shared: Reference, seed: int, index: int) -> tuple[State, float]:
             row = own[design.readings.ball[own] == ball][turn]
             x[row] += drawn.moved[k, :, group.rows.start + place]
     given = design.of(Lengths)
-    for side, ends in enumerate((given.first, given.second)):
-        x[ends] += drawn.ends[side][k].T
+    for row in np.union1d(given.first, given.second):
+        x[row] += drawn.moved[k, :, shared.order.tolist().index(row)]
     errors = {
         one.word: of_one[k] for one, of_one in zip(design.observations, drawn.errors, strict=True)
     }

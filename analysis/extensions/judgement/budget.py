@@ -12,11 +12,13 @@ from ballplate.presentation import Data, MainTable, Result, aligned, number, pic
 from ballplate.results import Fit, few_degrees_of_freedom
 from ballplate.simulator.computing import comparable, evenly_spread, single_threaded
 from ballplate.simulator.estimation import (
+    Combinations,
     Coordinates,
     Distances,
     LinearFunctions,
     Linearisation,
     MeasuredPoints,
+    Parameters,
     linear_functions,
     linearise,
 )
@@ -32,6 +34,10 @@ MOST_PLACES = 200
 # Distances of which the derivatives are in memory.
 PAIRS_AT_ONCE = 1000
 
+# What contributes to dimensions of parts and is no source of the estimate.
+OUTSIDE = "probing and part"
+MEMBERS = "a dimension, or of a form or zone the root mean square of what it consists of"
+
 # Figures side by side in a table of text.
 SIDE_BY_SIDE = 6
 
@@ -41,7 +47,8 @@ class BudgetFigure:
     """An uncertainty with the `contributions` of all sources to it, which add in squares; metres.
 
     Of several functions, such as the distances of U6, it is the root mean square of the determined
-    ones; `undetermined` of the `count` are not. NaN if all are undetermined.
+    ones; `undetermined` of the `count` are not. NaN if all are undetermined. `outside` is what
+    comes from no source of the estimate.
     """
 
     name: str
@@ -50,6 +57,8 @@ class BudgetFigure:
     contributions: tuple[float, ...]
     count: int = 1
     undetermined: int = 0
+    outside: float = 0.0
+    unit: str = "m"
 
 
 @dataclass(frozen=True, repr=False)
@@ -104,7 +113,7 @@ class UncertaintyBudget(Result):
             "source": list(self.sources) * len(self.figures),
             "standard uncertainty, µm": [figure.contributions[k] for figure, k in pairs],
             "share of variance": [_ratio(*pair) for pair in pairs],
-            "unit": ["m"] * len(pairs),
+            "unit": [figure.unit for figure, _ in pairs],
         }
         return columns, ()
 
@@ -118,8 +127,7 @@ class UncertaintyBudget(Result):
                     "figure": figure.name,
                     **picked(figure, "description", "standard_uncertainty"),
                     "expanded_uncertainty": self.coverage_factor * figure.standard_uncertainty,
-                    "unit": "m",
-                    **picked(figure, "count", "undetermined"),
+                    **picked(figure, "unit", "count", "undetermined"),
                     "contributions": [
                         {
                             "source": source,
@@ -190,7 +198,10 @@ def budget(
     if fit is not None and fit.sigma_is_estimated:
         remedy = "--sigma given takes the uncertainties as stated"
         caution = few_degrees_of_freedom(fit.degrees_of_freedom, "sigma", remedy)
-    names, figures = _largest_first(sums.names, tuple(_figures(linearisation, sums, sigma)))
+    names, computed = sums.names, tuple(_figures(linearisation, sums, sigma))
+    if any(figure.outside for figure in computed):
+        names, computed = (*names, OUTSIDE), tuple(map(_with_outside, computed))
+    names, figures = _largest_first(names, computed)
     return UncertaintyBudget(
         experiment.label,
         experiment.title,
@@ -200,6 +211,14 @@ def budget(
         sigma,
         fit is not None,
         caution,
+    )
+
+
+def _with_outside(figure: BudgetFigure) -> BudgetFigure:
+    return replace(
+        figure,
+        standard_uncertainty=float(np.hypot(figure.standard_uncertainty, figure.outside)),
+        contributions=(*figure.contributions, figure.outside),
     )
 
 
@@ -238,13 +257,16 @@ def _figures(
     design = linearisation.design
     for symbol, kind in QUANTITIES.items():
         groups = functions_of(symbol, design, linearisation.layout)
-        functions = [group for group in groups if isinstance(group, Coordinates | Distances)]
+        functions = [group for group in groups if not isinstance(group, Parameters)]
         places = functions[0].places if functions else None
         if not isinstance(places, MeasuredPoints):
             continue
         if isinstance(functions[0], Coordinates):
             of_points: Iterable[LinearFunctions] = [linear_functions(linearisation, functions[0])]
             words = f"{kind.description}, root mean square of its co-ordinates"
+        elif isinstance(functions[0], Combinations):
+            yield from _members(linearisation, sums, functions[0], sigma)
+            continue
         elif functions[0].names:
             prefix = "" if symbol == "tasks" else f"{symbol} "
             words = f"{kind.description}:"
@@ -266,6 +288,25 @@ def _figures(
     diagonals = Distances(MeasuredPoints(points, probes), pairs, names)
     words = "length of the body diagonal" if design.dimension == 3 else "length of the diagonal"
     yield from _each("", words, linearisation, sums, diagonals, sigma)
+
+
+def _members(
+    linearisation: Linearisation, sums: SourceSums, combinations: Combinations, sigma: float
+) -> Iterator[BudgetFigure]:
+    """Yield the uncertainties of combinations; of a function of several, the root mean square of
+    these.
+    """
+    functions = linear_functions(linearisation, combinations)
+    outside = np.asarray(combinations.outside.power(2).sum(axis=1)).ravel()
+    for i, name in enumerate(combinations.names):
+        members = slice(*combinations.starts[i : i + 2])
+        unit = combinations.units[i]
+        title = name if unit == "m" else f"{name}, µ{unit}"
+        some = [LinearFunctions(functions.shared[members])]
+        figure = _mean_square(title, MEMBERS, linearisation, sums, some, sigma)
+        yield replace(
+            figure, unit=unit, outside=float(np.sqrt(outside[members].mean())), undetermined=0
+        )
 
 
 def _some(places: Any) -> MeasuredPoints:

@@ -15,7 +15,13 @@ from itertools import chain, compress
 
 import numpy as np
 from ballplate.simulator.computing import svd
-from ballplate.simulator.estimation import BallPlaces, Distances, MeasuredPoints, point_rows
+from ballplate.simulator.estimation import (
+    BallPlaces,
+    Combinations,
+    Distances,
+    MeasuredPoints,
+    point_rows,
+)
 from ballplate.simulator.experiment import Experiment
 from ballplate.simulator.geometry import without_rigid_motion
 from ballplate.simulator.inputs import Flags, Target, refused
@@ -35,8 +41,12 @@ _LENGTHS.sort(key=lambda symbol: not QUANTITIES[symbol].has_target)
 
 DESCRIPTIONS: dict[CriterionName, str] = {}
 for _symbol in _LENGTHS:
-    DESCRIPTIONS[_symbol] = f"average uncertainty of {QUANTITIES[_symbol].description}"
-    DESCRIPTIONS[_symbol + MAXIMUM] = f"largest uncertainty of {QUANTITIES[_symbol].description}"
+    _words = QUANTITIES[_symbol].description
+    if QUANTITIES[_symbol].by_limits:
+        DESCRIPTIONS[_symbol] = f"largest share of what the limits of {_words} leave to the map"
+        continue
+    DESCRIPTIONS[_symbol] = f"average uncertainty of {_words}"
+    DESCRIPTIONS[_symbol + MAXIMUM] = f"largest uncertainty of {_words}"
 DESCRIPTIONS |= {
     "A": "root mean square uncertainty of the machine's parameters",
     "D": "geometric mean of the semi-axes of the parameters' uncertainty ellipsoid",
@@ -91,11 +101,11 @@ class Criterion:
 
     @property
     def largest(self) -> bool:
-        return self.name.endswith(MAXIMUM)
+        return self.name.endswith(MAXIMUM) or _is_by_limits(self.name)
 
     @property
     def unit(self) -> str:
-        return "1" if self.name == "condition" else "m"
+        return "1" if self.name == "condition" or _is_by_limits(self.name) else "m"
 
     @property
     def is_bounded(self) -> bool:
@@ -394,6 +404,10 @@ class Several:
         )
 
 
+def _is_by_limits(name: CriterionName) -> bool:
+    return name in QUANTITIES and QUANTITIES[name].by_limits
+
+
 def is_about_balls(name: CriterionName) -> bool:
     """True if a criterion needs all balls, beyond their information on the machine."""
     kind = QUANTITIES.get(name.removesuffix(MAXIMUM))
@@ -435,8 +449,11 @@ def criterion(information: Information, experiment: Experiment, name: CriterionN
             raise refused(experiment.source, text, "pool")
         scaled = _of_shared(information, STEP * np.eye(drawn.shared)[model])
     else:
-        parts = []
+        parts = list[Pairs | Linear]()
         for quantity_functions in functions_of(symbol, drawn.design, drawn.layout):
+            if isinstance(quantity_functions, Combinations):
+                parts.append(_combinations(information, experiment, quantity_functions))
+                continue
             assert isinstance(quantity_functions, Distances)
             if isinstance(quantity_functions.places, BallPlaces):
                 plate = drawn.design.artefacts.names[
@@ -464,6 +481,8 @@ def _target(experiment: Experiment, name: CriterionName, functions: Several | No
     """
     if functions is None:
         return None
+    if _is_by_limits(name):
+        return 1.0
     parts = functions.parts
     stated_targets = [
         target for part in parts if isinstance(part, Linear) for target in part.targets
@@ -517,6 +536,33 @@ def _distances(information: Information, distances: Distances) -> Pairs | Linear
     is_kept = np.abs(change).max(axis=1, initial=0.0) <= OPEN * STEP
     targets = tuple(compress(distances.targets, is_kept))
     return Linear(rows[is_kept], length[is_kept], int((~is_kept).sum()), targets)
+
+
+def _combinations(
+    information: Information, experiment: Experiment, combinations: Combinations
+) -> Linear:
+    """Members with a limit that the pool determines, as shares of what it leaves to them.
+
+    :raises ExperimentError: a limit is below what no plan reduces.
+    """
+    allowed = combinations.allowed
+    for i, name in enumerate(combinations.names):
+        if (allowed[slice(*combinations.starts[i : i + 2])] <= 0.0).any():
+            text = (
+                f"no plan holds the limit of {name}, which is exceeded without any uncertainty of"
+                " the map; widen it"
+            )
+            raise refused(experiment.source, text, "pool")
+    limited = np.flatnonzero(~np.isnan(allowed))
+    moved = _of_points(information, combinations.places)
+    rows, change = (
+        combinations.weights[limited] @ amount.reshape(combinations.weights.shape[1], -1)
+        for amount in moved
+    )
+    size = abs(combinations.weights[limited]).sum(axis=1)
+    is_kept = np.abs(change).max(axis=1, initial=0.0) <= OPEN * STEP * np.asarray(size).ravel()
+    rows = rows[is_kept] / allowed[limited[is_kept], None]
+    return Linear(rows, np.ones(len(rows)), int((~is_kept).sum()))
 
 
 def _of_balls(information: Information, places: BallPlaces) -> tuple[Array, Array]:

@@ -11,7 +11,6 @@ from ballplate.cli import (
     add_force,
     add_json,
     add_output,
-    add_picture,
     add_workers,
     count,
     note,
@@ -101,11 +100,6 @@ def add_options(parser: ArgumentParser) -> None:
     output.add_argument(
         "--curve", action="store_true", help="plan for smaller and larger budgets as well"
     )
-    add_picture(
-        output,
-        "--plot",
-        help="draw the choice in the volume or, with --curve, the criterion against the limit",
-    )
     add_force(output)
     add_json(parser)
     parser.add_argument(
@@ -188,8 +182,6 @@ def _write(campaign: Campaign, options: Namespace) -> None:
         contents[options.output] = campaign.to_yaml(options.output.parent)
     if options.sheet is not None:
         contents[options.sheet] = campaign.sheet_page()
-    if options.plot is not None:
-        contents[options.plot] = campaign.plot
     if write(options, contents):
         for path in filter(None, (options.output, options.sheet)):
             note(options, f"{path} written")

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ballplate.presentation import Data, Result, aligned, number, picked
 from ballplate.results import (
@@ -25,9 +25,6 @@ from .experiment_file import experiment_text
 from .run_sheet_tables import sheet_data, sheet_lines
 from .schedule import RunSheet
 from .set_ups import REST, base_name
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 # Candidates left out, and reasons for leaving candidates out of the pool, that are told.
 TOLD = 5
@@ -247,19 +244,6 @@ class Campaign(Result):
         """One row for each step of the run sheet, times in seconds."""
         return list(sheet_data(self.sheet)["steps"])
 
-    def plot(self, path: str | Path | None = None) -> Figure:
-        """Draw the criterion against the limit, or without a curve the positions in the volume.
-
-        With a path, which ends in .svg, .png or .pdf, the picture is written as well.
-
-        :raises ImportError: matplotlib is missing.
-        :raises ValueError: the path has another suffix.
-        """
-        if not self.curve:
-            return self.prediction.plot(path)
-        figure: Figure = service("draw_curve")(self, path)
-        return figure
-
 
 def _interrupted(campaign: Campaign) -> list[str]:
     """Return lines on positions that were read in part."""
@@ -314,6 +298,7 @@ def _comparison(campaign: Campaign) -> list[str]:
         rows.append([words, *_value(campaign, campaign.drawn), *_spent(campaign.drawn_spent)])
     if campaign.target is not None:
         words = "target / k" if campaign.criterion.endswith(MAXIMUM) else "mean of target / k"
+        words = words if campaign.unit == "m" else "limit"
         rows.append([words, *_value(campaign, campaign.target), "", "", ""])
     return aligned(rows, [False, True, False, True, True, True])
 

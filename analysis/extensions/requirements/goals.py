@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -16,9 +17,17 @@ from ballplate.simulator.inputs import (
     parse_positive_angle,
     parse_positive_length,
 )
-from ballplate.uncertainty import DESCRIPTIONS, QUANTITIES, Quantity
+from ballplate.uncertainty import DESCRIPTIONS, QUANTITIES, NamedUncertainty, Quantity
 
-FORMS = 'lengths, tasks, or a quantity such as "U6 average 0.3 um" or "U2 angles maximum 1 urad"'
+# Goals that are met if all values of a quantity with names are within their targets.
+NAMED = {
+    "tasks": ("task", "evaluation.tasks"),
+    "dimensions": ("dimension", "part"),
+}
+FORMS = (
+    'lengths, tasks, dimensions, or a quantity such as "U6 average 0.3 um" or'
+    ' "U2 angles maximum 1 urad"'
+)
 # Wholes that have values of several units.
 MIXED = tuple(symbol for symbol, kind in QUANTITIES.items() if kind.parts)
 RATIOS = tuple(
@@ -39,11 +48,12 @@ class Goal:
     """A goal of a design.
 
     `lengths`: at least the `share` of the distances between corrected points (U6) within the
-    target uncertainty of the file. `tasks`: every task within its target. `quantity`: a
+    target uncertainty of the file. `tasks` and `dimensions`: every one within its target.
+    `quantity`: a
     `statistic` of the quantity `symbol` at most `limit`, in metres or radians.
     """
 
-    kind: Literal["lengths", "tasks", "quantity"] = "lengths"
+    kind: Literal["lengths", "tasks", "dimensions", "quantity"] = "lengths"
     share: float = 1.0
     symbol: str = "U6"
     statistic: Literal["maximum", "average"] = "average"
@@ -53,8 +63,8 @@ class Goal:
         if self.kind == "lengths":
             share = "all" if self.share == 1.0 else f"{percent(self.share)} of"
             return f"{share} lengths (U6) within the target uncertainty"
-        if self.kind == "tasks":
-            return "every task within its target"
+        if self.kind in NAMED:
+            return f"every {NAMED[self.kind][0]} within its target"
         unit = "µrad" if self.symbol.endswith("angles") else "µm"
         return f"{self.statistic} {self.symbol} at most {1e6 * self.limit:.9g} {unit}"
 
@@ -82,8 +92,8 @@ def parse_goal(text: str, share: float | None = None) -> Goal:
     >>> str(parse_goal("lengths", 0.95))
     '95 % of lengths (U6) within the target uncertainty'
     """
-    if text in ("lengths", "tasks"):
-        if share is not None and text == "tasks":
+    if text == "lengths" or text in NAMED:
+        if share is not None and text in NAMED:
             raise GoalError("a share applies to the goal lengths; leave it out")
         return Goal(text, 1.0 if share is None else share)  # type: ignore[arg-type]
     match = PATTERN.fullmatch(text)
@@ -121,11 +131,14 @@ def check_goal(goal: Goal, prediction: Prediction | PlannedUncertainty) -> None:
             'the file states no target_uncertainty; add it, such as "0.5 um + L/1000000", or give'
             " --target or --goal"
         )
-    if goal.kind == "tasks":
-        if not prediction.tasks:
-            raise GoalError("the file has no tasks; add evaluation.tasks, or give another goal")
-        without = [task.name for task in prediction.tasks if task.target is None]
-        if without:
+    if goal.kind in NAMED:
+        word, key = NAMED[goal.kind]
+        if goal.kind not in prediction.quantities:
+            raise GoalError(f"the file has no {word}s; add {key}, or give another goal")
+        without = [one.name for one in prediction.quantities[goal.kind].named if one.target is None]
+        if len(without) == len(prediction.quantities[goal.kind].named) and word == "dimension":
+            raise GoalError("the part states no tolerance; add one, or give another goal")
+        if without and goal.kind == "tasks":
             raise GoalError(
                 f"no target for {listing(without)}; give target_uncertainty to tasks, or to the"
                 " file"
@@ -134,8 +147,8 @@ def check_goal(goal: Goal, prediction: Prediction | PlannedUncertainty) -> None:
 
 def judge(goal: Goal, prediction: Prediction | PlannedUncertainty) -> Judgement:
     """Return the judgement of a goal that `check_goal` accepts."""
-    if goal.kind == "tasks":
-        return _judge_tasks(prediction)
+    if goal.kind in NAMED:
+        return _judge_named(NAMED[goal.kind][0], prediction.quantities[goal.kind].named)
     if goal.kind == "quantity":
         summary = prediction.quantities[goal.symbol]
         value = getattr(summary, goal.statistic)
@@ -161,22 +174,21 @@ def judge(goal: Goal, prediction: Prediction | PlannedUncertainty) -> Judgement:
     return Judgement(is_met, 1.0 - share, words, summary.undetermined)
 
 
-def _judge_tasks(prediction: Prediction | PlannedUncertainty) -> Judgement:
-    ratios = [
-        task.coverage_factor * task.standard_uncertainty / task.target
-        for task in prediction.tasks
-        if task.target is not None
-    ]
+def _judge_named(word: str, named: Sequence[NamedUncertainty]) -> Judgement:
+    judged = [one for one in named if one.target is not None]
+    ratios = [one.share_of_target for one in judged]
     undetermined = sum(map(math.isnan, ratios))
     within = sum(ratio <= 1.0 for ratio in ratios)
-    words = f"{within} of {len(ratios)} tasks within their targets by the "
-    words += uncertainty_words(prediction.tasks[0].coverage_factor)
+    words = f"{within} of {len(ratios)} {word}s within their targets"
+    if not judged:
+        return Judgement(True, 0.0, words, 0)
+    words += f" by the {uncertainty_words(judged[0].coverage_factor)}"
     if undetermined:
         words += f", {undetermined} undetermined"
         return Judgement(False, math.inf, words, undetermined)
     worst = int(comparable(ratios).argmax())
     words += (
-        f"; the largest share of its target has {prediction.tasks[worst].name},"
+        f"; the largest share of its target has {judged[worst].name},"
         f" {number(100 * ratios[worst])} %"
     )
     return Judgement(within == len(ratios), ratios[worst], words, 0)

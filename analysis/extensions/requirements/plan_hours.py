@@ -25,10 +25,12 @@ def hours_answer(experiment: Experiment, goal: Goal) -> Answer:
     if experiment.pool is None:
         raise NotVariableError("the file has no pool of positions to plan from; add one")
 
+    wanted = "dimensions" if goal.kind == "dimensions" else "U6"
+
     @cache
     def planned(quarters: int) -> Campaign | None:
         try:
-            return campaign(experiment, Request(budget=Budget(QUARTER * quarters)))
+            return campaign(experiment, Request(wanted, Budget(QUARTER * quarters)))
         except ExperimentError:
             return None
 

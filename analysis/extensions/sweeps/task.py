@@ -254,6 +254,9 @@ def plan_figures(planned: Prediction, record: tuple[str, ...]) -> dict[str, floa
         figures[f"{name}_count"] = float(quantity.count)
         if quantity.within_target is not None:
             figures[f"{name}_within_target"] = quantity.within_target
+        shares = [one.share_of_target for one in quantity.named if one.target is not None]
+        if shares:
+            figures[f"{name}_largest_share_of_target"] = max(shares)
     return figures
 
 
