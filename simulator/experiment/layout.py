@@ -153,6 +153,7 @@ def lay_out(experiment: Experiment, is_pool: bool = False) -> Design:
             tuple(task.target for task in tasks),
         ),
         noise=experiment.noise,
+        sections=experiment.sections,
     )
     return with_influences(design, experiment, is_pool)
 

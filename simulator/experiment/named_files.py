@@ -62,8 +62,8 @@ def _has_model_in_python(path: Path) -> bool:
 MODULE = ".py"
 YAML = (".yaml", ".yml")
 
-# Keys of experiment and machine files whose text is a path, as their schemas say.
-PATH_KEYS = ("file", "files", "values", "covariance")
+# Keys of experiment, machine and part files whose text is a path, as their schemas say.
+PATH_KEYS = ("file", "files", "values", "covariance", "points", "random_part")
 
 
 def named_by(source: Path) -> list[Path]:

@@ -14,6 +14,7 @@ from .reading_sources import (
     position_fingerprints as position_fingerprints,
 )
 from .simulated import (
+    HasRandomPart as HasRandomPart,
     NoReadingError as NoReadingError,
     Simulated as Simulated,
     exact_readings as exact_readings,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from ballplate.simulator.design.arrays import Design, Readings
@@ -24,6 +25,42 @@ from ballplate.simulator.machines.truth import TrueMachine, true_machine
 
 class NoReadingError(ValueError):
     """The true machine's errors are so large that no scale reading belongs to some location."""
+
+
+@runtime_checkable
+class HasRandomPart(Protocol):
+    """An error model of a true machine whose errors are partly random."""
+
+    def random_roots(self, x: Array, p: Array) -> tuple[Array, Array]:
+        """Return square roots of the covariance of errors, in metres, at scale readings x (m, d)
+        with probe offsets p (m, d): (m, d, k) of those drawn anew at each approach, (m, d, l) of
+        lasting ones.
+        """
+        ...
+
+
+def random_displacements(
+    model: ErrorModel,
+    truth: State,
+    readings: Readings,
+    x: Array,
+    generator: np.random.Generator,
+    count: int,
+) -> Array:
+    """Draw displacements (count, m, d) of readings at x (m, d), means of their repeats, in metres,
+    in `count` campaigns; zero if the `model` of the true machine has no random part.
+    """
+    if not isinstance(model, HasRandomPart):
+        return np.zeros((count, *x.shape))
+    approach, lasting = model.random_roots(x, truth.probes[readings.probe])
+    # An equal root of as few numbers as there are axes, since many of them are drawn.
+    root = (
+        np.linalg.qr(approach.swapaxes(1, 2), mode="r") / np.sqrt(readings.repeats)[:, None, None]
+    )
+    anew = generator.standard_normal((count, *root.shape[:2]))
+    once = generator.standard_normal((count, lasting.shape[2]))
+    drawn = np.einsum("bmk,mkd->bmd", anew, root) + np.einsum("bl,mdl->bmd", once, lasting)
+    return np.asarray(drawn)
 
 
 def on_true_machine(design: Design, machine: TrueMachine) -> tuple[Design, State]:
@@ -81,10 +118,13 @@ def exact_readings(design: Design, truth: State) -> tuple[Readings, Array]:
 def noisy_readings(
     design: Design, truth: State, generator: np.random.Generator
 ) -> tuple[Readings, Array]:
-    """Return `exact_readings` with noise of the readings' standard uncertainties."""
+    """Return `exact_readings` with noise of the readings' standard uncertainties, and with the
+    random part of the machine's errors.
+    """
     readings, x = exact_readings(design, truth)
     noise = design.noise.draw(generator, x.shape, readings.position, 0)
-    return readings, x + noise * reading_uncertainties(design, readings)
+    random = random_displacements(design.model, truth, readings, x, generator, 1)
+    return readings, x + noise * reading_uncertainties(design, readings) + random[0]
 
 
 def true_influences(design: Design, generator: np.random.Generator) -> Array:

@@ -29,7 +29,7 @@ TOP = Path(__file__).parents[2]
 SHIPPED = sorted(
     path
     for path in (TOP / "designs").rglob("*.yaml")
-    if path.parent.name not in ("sweeps", "machines", "planning")
+    if path.parent.name not in ("sweeps", "machines", "parts", "planning")
 )
 
 

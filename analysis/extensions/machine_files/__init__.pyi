@@ -22,6 +22,12 @@ from .interface import (
 from .machine_file import load_machine as load_machine
 from .map_files import is_map_file as is_map_file, read_map as read_map
 from .map_of_fit import data_of as data_of, left_out_words as left_out_words
+from .random_errors import (
+    RandomPart as RandomPart,
+    deviations_at as deviations_at,
+    random_part as random_part,
+    random_roots as random_roots,
+)
 from .sigmas_by_campaign import campaign_sigmas as campaign_sigmas, with_sigmas as with_sigmas
 from .volumetric import (
     VolumetricModel as VolumetricModel,

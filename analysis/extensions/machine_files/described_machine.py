@@ -2,24 +2,45 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
 from ballplate.simulator.design import Machine
 from ballplate.simulator.experiment import References
 from ballplate.simulator.inputs import ExperimentError, Length, format_length, listing
 from ballplate.simulator.machines import (
+    Array,
     Corner,
     ErrorModel,
     FurtherTrueMachine,
     PlaneModel,
     TrueMachine,
 )
+from ballplate.simulator.readings import HasRandomPart
 from pydantic import Field, PrivateAttr
 
-from .description import MachineDescription, random_part, true_volumetric
-from .framing import in_frame_of
+from .description import MachineDescription, true_volumetric
+from .framing import FramedModel, in_frame_of
 from .machine_file import load_machine
+from .random_errors import RandomPart, random_part, random_roots
 from .volume_ends import check_within
+
+
+@dataclass(frozen=True)
+class PartlyRandom(FramedModel, HasRandomPart):
+    """Errors with a random part, in two dimensions that at a `level` of the z axis, in metres."""
+
+    random: RandomPart
+    level: float
+
+    def random_roots(self, x: Array, p: Array) -> tuple[Array, Array]:
+        """Return roots as a model with a random part does."""
+        d = self.dimension
+        beyond = np.zeros((len(x), 3 - d))
+        in_space = np.hstack([x, beyond + self.level]), np.hstack([p, beyond])
+        approach, lasting = random_roots(self.random, *in_space)
+        return approach[:, :d], lasting[:, :d]
 
 
 class TrueMachineFileSettings(FurtherTrueMachine):
@@ -33,11 +54,12 @@ class TrueMachineFileSettings(FurtherTrueMachine):
             "In two dimensions the position of the z axis; default: that of the reference point."
         ),
     )
-    random_part: Literal["omitted"] | None = Field(
-        default=None,
+    random_part: Literal["drawn", "omitted"] = Field(
+        default="drawn",
         description=(
-            '"omitted": simulate without the random part of the file, which machine.repeatability '
-            "covers. Without this key, a file with a random part is refused."
+            "Whether simulated readings have the random part of the file: errors within bandwidths"
+            " and of probing anew in each reading, those of squareness and temperature once in each"
+            " simulated campaign. Where it is omitted, machine.repeatability covers it."
         ),
     )
 
@@ -45,13 +67,17 @@ class TrueMachineFileSettings(FurtherTrueMachine):
     _machine: MachineDescription | None = PrivateAttr(default=None)
 
     def true_machine(self, fitted: ErrorModel, lower: Corner, upper: Corner) -> TrueMachine:
-        """Return the systematic errors of the machine, in two dimensions those at the level."""
+        """Return the errors of the machine, in two dimensions those at the level."""
         assert self._machine is not None
         machine = true_volumetric(self._machine)
+        level = self._machine.reference[2] if self.level is None else self.level
         if len(lower) == 2:
-            level = self._machine.reference[2] if self.level is None else self.level
             machine = TrueMachine(PlaneModel(machine.model, level), machine.a)
-        return in_frame_of(fitted, machine, lower, upper)
+        framed = in_frame_of(fitted, machine, lower, upper)
+        if self.random_part == "omitted":
+            return framed
+        random = random_part(self._machine)
+        return TrueMachine(PartlyRandom(machine.model, lower, random, level), framed.a)
 
 
 SETTINGS = TrueMachineFileSettings
@@ -68,14 +94,14 @@ def read(
         references.problems.take(error, steps)
         return truth
     truth = truth.completed(_machine=true_machine)
-    random = random_part(true_machine)
-    if random and truth.random_part is None:
+    random = random_part(true_machine).meanings
+    if random and truth.random_part == "drawn":
         text = (
-            f"has a random part that simulated readings would lack: {listing(random)}; let"
-            " machine.repeatability cover it and add random_part: omitted, or leave it out of the"
-            " machine file"
+            f"has a random part ({listing(random)}) that simulated readings alone have; predicted"
+            " uncertainties have as much of it as machine.repeatability covers: determine them by"
+            " Monte Carlo (run --trials), or write random_part: omitted"
         )
-        references.problems.add(steps, text)
+        references.problems.doubt(steps, text)
     if machine is None:
         return truth
     level = truth.level

@@ -189,24 +189,6 @@ class MachineDescription:
         return self.upper[axis] - self.lower[axis]
 
 
-def random_part(machine: MachineDescription) -> tuple[str, ...]:
-    """Return descriptions of a machine's random parts: bandwidths, temperatures and probing."""
-
-    def is_random(deviation: float | Points | None) -> bool:
-        return any(deviation.values) if isinstance(deviation, Points) else bool(deviation)
-
-    errors: list[ParametricError | Squareness] = [*machine.errors, *machine.squareness]
-    bandwidths = [error.name for error in errors if is_random(error.deviation)]
-    uncertain = [
-        axis for axis, state in machine.temperature.items() if state.uncertainty and state.expansion
-    ]
-    return (
-        *(f"bandwidth of {name}" for name in bandwidths),
-        *(f"uncertain temperature of {axis}" for axis in uncertain),
-        *(["probing"] if machine.probing else []),
-    )
-
-
 def coupling(machine: MachineDescription, error: ParametricError) -> Array:
     """Return effects of the three rotations of an error's axis on its line of measurement, (3,)
     m/rad.
