@@ -121,28 +121,16 @@ class Correction(Result):
     @property
     def warnings(self) -> tuple[str, ...]:
         """Warnings: extrapolation, few degrees of freedom, effects not applied."""
-        fitted, cautions = self.fitted, [self.fitted.lack_of_fit.caution]
+        lack, *cautions = map_cautions(self.fitted, self.coverage_factor)
         outside = np.flatnonzero(self.outside)
         if len(outside):
             words = listing((self.given.name(int(i)) for i in outside), 3)
-            cautions.append(
+            cautions.insert(
+                0,
                 f"{len(outside)} of {len(self.points)} points lie outside the volume of the map;"
-                f" corrections are extrapolated and U need not hold: {words}"
+                f" corrections are extrapolated and U need not hold: {words}",
             )
-        if fitted.without_scatter:
-            cautions.append(
-                "the readings of the map agree with its model except for rounding, as computed ones"
-                " do: its uncertainties are zero, too, and cannot be relied on"
-            )
-        if fitted.sigma_is_estimated:
-            remedy = f"expanded uncertainties with k = {self.coverage_factor:g} may be too small"
-            freedom = fitted.degrees_of_freedom
-            cautions.append(few_degrees_of_freedom(freedom, "sigma", remedy))
-        if not stretches(fitted.model, fitted.volume, fitted.values):
-            cautions.append(OWN_SCALES)
-        if fitted.left_out:
-            cautions.append(left_out_words(fitted))
-        return tuple(filter(None, cautions))
+        return tuple(filter(None, [lack, *cautions]))
 
     def lines(self) -> list[str]:
         fitted, k = self.fitted, self.coverage_factor
@@ -272,6 +260,24 @@ class Correction(Result):
         """One row for each point, in metres."""
         u = by_axis("u {}, µm", self.standard_uncertainties)
         return {**self._columns(), **u, "unit": ["m"] * len(self.points)}, ()
+
+
+def map_cautions(fitted: FittedMap, coverage_factor: float) -> list[str]:
+    """Return what uncertainties by a map take for granted, the lack of fit first; some are
+    empty.
+    """
+    cautions = [fitted.lack_of_fit.caution]
+    if fitted.without_scatter:
+        cautions.append(
+            "the readings of the map agree with its model except for rounding, as computed ones"
+            " do: its uncertainties are zero, too, and cannot be relied on"
+        )
+    if fitted.sigma_is_estimated:
+        remedy = f"expanded uncertainties with k = {coverage_factor:g} may be too small"
+        cautions.append(few_degrees_of_freedom(fitted.degrees_of_freedom, "sigma", remedy))
+    if not stretches(fitted.model, fitted.volume, fitted.values):
+        cautions.append(OWN_SCALES)
+    return [*cautions, left_out_words(fitted) if fitted.left_out else ""]
 
 
 OWN_SCALES = (

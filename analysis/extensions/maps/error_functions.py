@@ -108,8 +108,8 @@ def stated_functions(
         description = error.name, meaning(error.name), along.unit, "", error.axis
         stated = _stated_as(along)
         curves.append(FunctionCurve(*description, along.positions, values, deviation, stated))
-    lasting, sizes = built.lasting
-    deviations = dict(zip((field.name for field in lasting.fields), sizes.tolist(), strict=True))
+    names_of_lasting, sizes = built.random.names[1], built.random.sizes.tolist()
+    deviations = dict(zip(names_of_lasting, sizes, strict=True))
     numbers = [
         EstimatedNumber(
             *(parameter.name, parameter.meaning, parameter.unit, value),

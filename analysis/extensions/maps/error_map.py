@@ -264,7 +264,7 @@ def _errors_of_machine(
     file: Path, asked: PlacesAsked, draws: Draws | None, with_budget: bool
 ) -> ErrorMap:
     built, source = source_of_machine(file)
-    if draws is not None and not built.is_random:
+    if draws is not None and not built.random.meanings:
         raise ValueError("this machine has no random part; leave the realisations out")
     places = map_places(built.volume, asked)
     return ErrorMap(

@@ -13,7 +13,7 @@ from ballplate.simulator.machines import Array, Integers
 from ..machine_files import FittedMap
 from .corrected_points import POINTS_AT_ONCE, corrected, drawn_rows, probe_indices
 from .map_places import MapPlaces
-from .realisations import Draws, Realisations, symmetric_root
+from .realisations import Draws, Realisations, drawn_deviations, drawn_offsets
 from .volumetric_errors import LengthErrors, VolumetricErrors, length_errors
 
 # Indices (m,) of probes, or of the one of all points.
@@ -88,8 +88,7 @@ def drawn_errors(
     all points of a machine.
     """
     draws.ensure_possible(places.points)
-    (normal,) = draws.normal((len(fitted.scale),))
-    deviations = normal @ symmetric_root(fitted.covariance, fitted.scale).T
+    deviations = drawn_deviations(fitted, draws)
     points = places.points
     errors = np.zeros((draws.count, *points.shape))
     for start in range(0, len(points), POINTS_AT_ONCE):
@@ -99,4 +98,7 @@ def drawn_errors(
     errors += fitted_errors(fitted, points, probes).errors
     lengths = fitted_lengths(fitted, places, probe).errors
     rows, _ = _length_rows(fitted, places, probe)
-    return Realisations(draws, errors, lengths + deviations @ rows.T)
+    offsets = drawn_offsets(fitted, deviations)
+    estimated = np.flatnonzero(fitted.probes.free.any(axis=1)).tolist()
+    by_probe = {fitted.probes.names[k]: offsets[:, k] for k in estimated}
+    return Realisations(draws, errors, lengths + deviations @ rows.T, by_probe)

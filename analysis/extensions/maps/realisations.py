@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
-from ballplate.presentation import Data, as_data
-from ballplate.simulator.computing import eigh
+from ballplate.presentation import Data, as_data, given
+from ballplate.simulator.computing import eigh, single_threaded
 from ballplate.simulator.machines import Array
+
+from ..machine_files import FittedMap
 
 # Realisations that are drawn at most, and co-ordinates of all of them, of eight bytes each.
 MOST_DRAWS, MOST_NUMBERS = 1000, 20_000_000
@@ -38,12 +41,14 @@ class Draws:
 @dataclass(frozen=True, eq=False)
 class Realisations:
     """Drawn errors (n, m, d) at points and errors (n, k) of lengths, in metres, of one machine or
-    one run each.
+    one run each; of a map also the estimated `offsets` (n, d) of probes, which are no part of the
+    errors.
     """
 
     draws: Draws
     errors: Array
     lengths: Array
+    offsets: Mapping[str, Array] = field(default_factory=dict)
 
     def to_dict(self) -> Data:
         """Return plain data, None where undetermined."""
@@ -51,6 +56,7 @@ class Realisations:
             "seed": self.draws.seed,
             "errors": as_data(self.errors),
             "lengths": as_data(self.lengths),
+            **given(offsets=as_data(dict(self.offsets))),
         }
 
 
@@ -64,3 +70,28 @@ def symmetric_root(covariance: Array, scale: Array) -> Array:
     """
     values, vectors = eigh(covariance / np.outer(scale, scale))
     return scale[:, None] * (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
+
+
+@single_threaded
+def drawn_deviations(fitted: FittedMap, draws: Draws) -> Array:
+    """Deviations (count, m) of all parameters of a map, offsets of probes among them, from the
+    estimates, drawn from their joint covariance.
+    """
+    (normal,) = draws.normal((len(fitted.scale),))
+    return normal @ symmetric_root(fitted.covariance, fitted.scale).T
+
+
+def drawn_machines(fitted: FittedMap, count: int, seed: int = 1) -> tuple[Array, Array]:
+    """Return parameters a (count, n) of the error model and offsets (count, l, d) of all probes of
+    machines drawn from the joint covariance of a map, those of `map` with the same count and seed,
+    with whatever probe. Undetermined directions keep their estimates.
+    """
+    deviations = drawn_deviations(fitted, Draws(count, seed))
+    return fitted.values + deviations[:, : len(fitted.values)], drawn_offsets(fitted, deviations)
+
+
+def drawn_offsets(fitted: FittedMap, deviations: Array) -> Array:
+    """Return offsets (count, l, d) of all probes of machines with `drawn_deviations`."""
+    offsets = np.tile(fitted.probes.offsets, (len(deviations), 1, 1))
+    offsets[:, fitted.probes.free] += deviations[:, len(fitted.values) :]
+    return offsets

@@ -14,25 +14,17 @@ from typing import Literal
 
 import numpy as np
 from ballplate.simulator.design import Volume
-from ballplate.simulator.geometry import AXIS_NAMES
-from ballplate.simulator.machines import (
-    Array,
-    KinematicModel,
-    Parameter,
-    TrueMachine,
-    error_function,
-)
+from ballplate.simulator.machines import Array, Parameter, TrueMachine
 
 from ..machine_files import (
-    Combination,
     MachineDescription,
     ParametricError,
     Points,
-    PowerSeries,
-    VolumetricModel,
+    RandomPart,
+    deviations_at,
+    random_part,
+    random_roots,
     reference_functions,
-    squareness_field,
-    thermal_field,
     true_volumetric,
 )
 from .map_places import MapPlaces
@@ -40,9 +32,6 @@ from .realisations import Draws, Realisations
 
 # Points of a grid or a line: each takes half a kilobyte.
 MOST_POINTS = 200_000
-
-# The name of random errors that are of no axis.
-PROBING = "probing"
 
 # Points along an axis at which a parametric error is told.
 ALONG = 101
@@ -101,54 +90,16 @@ class Volumetric:
     def _counted(self, parameters: Sequence[Parameter]) -> Array:
         return np.array([self.only in ("", one.function) for one in parameters], float)
 
+    @cached_property
+    def random(self) -> RandomPart:
+        """The random part of the errors."""
+        return random_part(self.machine)
+
     @property
     def errors_by_name(self) -> dict[str, str]:
         """The meanings of all errors by their names."""
-        random = *self.approach[0].parameters, *self.lasting[0].parameters
-        meanings = {one.function: one.meaning for one in (*self.truth.model.parameters, *random)}
-        return meanings | ({PROBING: "in each co-ordinate"} if self.machine.probing else {})
-
-    @cached_property
-    def approach(self) -> tuple[VolumetricModel, tuple[float | Points, ...]]:
-        """Model with one parameter per function with a random part, and the deviations, drawn again
-        at each approach of a point.
-        """
-        machine = self.machine
-        random = [error for error in machine.errors if error.deviation is not None]
-        constant = Combination(((1.0, PowerSeries((1.0,))),))
-        functions = tuple(error_function(error.name, constant) for error in random)
-        chain = KinematicModel(
-            machine.arrangement, functions, machine.lower, machine.upper, origin=machine.reference
-        )
-        return VolumetricModel(chain, ()), tuple(
-            error.deviation for error in random if error.deviation is not None
-        )
-
-    @cached_property
-    def lasting(self) -> tuple[VolumetricModel, Array]:
-        """Model of random errors common to all points, squareness and temperatures, with their
-        deviations.
-        """
-        machine = self.machine
-        fields = [
-            (squareness_field(field.name), field.deviation)
-            for field in machine.squareness
-            if field.deviation
-        ]
-        for axis, temperature in machine.temperature.items():
-            if temperature.uncertainty:
-                fields.append(
-                    (
-                        thermal_field(AXIS_NAMES.index(axis)),
-                        abs(temperature.expansion) * temperature.uncertainty,
-                    )
-                )
-        chain = KinematicModel(
-            machine.arrangement, (), machine.lower, machine.upper, origin=machine.reference
-        )
-        return VolumetricModel(chain, tuple(field for field, _ in fields)), np.array(
-            [size for _, size in fields]
-        )
+        systematic = {one.function: one.meaning for one in self.truth.model.parameters}
+        return systematic | self.random.meanings
 
     @property
     def numbers(self) -> list[tuple[Parameter, float]]:
@@ -156,11 +107,6 @@ class Volumetric:
         every = zip(self.truth.model.parameters, self.truth.a.tolist(), strict=True)
         names = {error.name for error in self.machine.errors}
         return [(parameter, value) for parameter, value in every if parameter.function not in names]
-
-    @property
-    def is_random(self) -> bool:
-        """True if any error has a random part."""
-        return bool(self.approach[1] or len(self.lasting[1]) or self.machine.probing)
 
     def systematic(self, points: Array) -> Array:
         """Return systematic errors (m, 3) at scale readings (m, 3)."""
@@ -170,21 +116,13 @@ class Volumetric:
     def random_roots(self, points: Array) -> tuple[Array, Array]:
         """Return sensitivities times deviations: (m, 3, k) per approach, and (m, 3, l) lasting."""
         probe = np.broadcast_to(self.machine.probe, points.shape)
-        model, deviations = self.approach
-        columns = model.jacobian(points, np.zeros(len(deviations)), probe)
-        for k, (function, deviation) in enumerate(
-            zip(model.chain.functions, deviations, strict=True)
-        ):
-            columns[:, :, k] *= _deviations(deviation, points[:, function.axis])[:, None]
-        columns *= self._counted(model.parameters)
-        size = self.machine.probing * (self.only in ("", PROBING))
-        probing = np.broadcast_to(size * np.eye(3), (len(points), 3, 3))
-        lasting, sizes = self.lasting
-        return (
-            np.concatenate([columns, probing], axis=2),
-            lasting.jacobian(points, np.zeros(len(sizes)), probe)
-            * (sizes * self._counted(lasting.parameters)),
+        approach, lasting = (
+            root * np.array([self.only in ("", name) for name in names], float)
+            for root, names in zip(
+                random_roots(self.random, points, probe), self.random.names, strict=True
+            )
         )
+        return approach, lasting
 
     def errors(self, points: Array) -> VolumetricErrors:
         """Return errors at scale readings (m, 3); random parts add in quadrature."""
@@ -246,13 +184,6 @@ def drawn_machine_errors(built: Volumetric, places: MapPlaces, draws: Draws) -> 
     return Realisations(draws, errors, np.array(lengths).reshape(draws.count, -1))
 
 
-def _deviations(deviation: float | Points, positions: Array) -> Array:
-    """A standard deviation at positions (m,) along its axis."""
-    if isinstance(deviation, Points):
-        return np.interp(positions, deviation.positions, deviation.values)
-    return np.full(len(positions), deviation)
-
-
 @dataclass(frozen=True, eq=False)
 class AlongAxis:
     """A parametric error along its axis, at the reference point, and its deviation.
@@ -291,7 +222,7 @@ def along_axes(machine: MachineDescription, count: int = ALONG) -> list[AlongAxi
                 error,
                 positions,
                 functions[error.name].values(t)[:, 0] if error.name in functions else None,
-                None if deviation is None else _deviations(deviation, positions),
+                None if deviation is None else deviations_at(deviation, positions),
                 table,
             )
         )
