@@ -31,9 +31,10 @@ from .extensions.maps.interface import (
 )
 from .extensions.pages.interface import page as page
 from .extensions.pages.joint_table import joint_table as joint_table
+from .extensions.parts.acceptance_interface import acceptance as acceptance
+from .extensions.parts.interface import part as part
 from .extensions.planning.criteria import Criterion as Criterion
 from .extensions.planning.interface import plan as plan
-from .extensions.repair.interface import repair as repair
 from .extensions.reproduction.interface import reproduce as reproduce
 from .extensions.requirements.interface import reach as reach
 from .extensions.splines.interface import spline as spline

@@ -41,10 +41,8 @@ from .outputs import (
     UsageError as UsageError,
     add_force as add_force,
     add_output as add_output,
-    check_overwritten as check_overwritten,
     text_writer as text_writer,
     write as write,
-    write_outputs as write_outputs,
 )
 from .reading_options import (
     KEYS as KEYS,

@@ -36,8 +36,8 @@ REMEDY = (
     "check the folder, its permissions and its room, and whether another program has the file open"
 )
 
-# Options that name files which name others, as experiment, machine and map files do.
-NAMING = ("files", "file", "earlier", "map", "tasks", "after")
+# Options that name files which name others, as experiment, machine, map and part files do.
+NAMING = ("files", "file", "earlier", "map", "tasks", "after", "design")
 
 # What belongs to a store besides its file.
 BESIDE_STORE = ("-wal", "-shm", "-journal", ".lock")
@@ -165,18 +165,6 @@ def check_outputs(options: Namespace) -> None:
         messages += _reasons_against(output, options.force)
     if messages:
         raise ExperimentError(messages)
-
-
-def check_overwritten(path: Path) -> None:
-    """Refuse a file that cannot replace the existing one.
-
-    :raises ExperimentError: it cannot be written.
-    """
-    from ballplate.simulator.inputs.messages import ExperimentError
-
-    reasons = _reasons_against(Output("files", "--fix", path, None, False), force=True)
-    if reasons:
-        raise ExperimentError(reasons)
 
 
 def _refuse_screen(outputs: list[Output]) -> None:

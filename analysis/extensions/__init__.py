@@ -117,11 +117,7 @@ SHIPPED = (
     ),
     _here(
         "repair",
-        functions=_from("interface", "repair"),
-        services={
-            **_from("repair_search", "suggested"),
-            **_from("mending_command", "with_repairs"),
-        },
+        services=_from("repair_search", "suggested"),
     ),
     _here(
         "drafting",
@@ -147,7 +143,6 @@ SHIPPED = (
         },
         functions=_from("interface", "sheet"),
         services={
-            **_from("campaign_picture", "draw_curve"),
             **_from("sheet", "Sheet"),
             **_from("earlier", "begun"),
         },
@@ -236,6 +231,30 @@ SHIPPED = (
             ),
         },
         functions=_from("interface", "correct", "curves", "diff", "map"),
+    ),
+    _here(
+        "parts",
+        commands={
+            "part": Command(
+                "part_command",
+                "uncertainty of each dimension of a part, by a design or a map",
+                "use",
+            ),
+            "acceptance": Command(
+                "acceptance_command",
+                "predict or evaluate the acceptance test of a machine by ISO 10360-2",
+                "use",
+            ),
+        },
+        functions=_from("interface", "part") | _from("acceptance_interface", "acceptance"),
+        services={
+            **_from("part_uncertainty", "part_uncertainty"),
+            **_from("part_page", "part_page", "sections_of_part", "part_for_studio"),
+            **_from("acceptance_page", "acceptance_page"),
+        },
+        sections={"part": "experiment_section"},
+        schemas={"part": "part_sections"},
+        quantities={"dimensions": "dimension_quantity"},
     ),
     _here(
         "splines",

@@ -30,7 +30,6 @@ from .scenes import (
     hull as hull,
     names_fit as names_fit,
     projection as projection,
-    scene as scene,
 )
 from .svg import (
     DASHES as DASHES,
@@ -44,12 +43,9 @@ from .svg import (
     drawing as drawing,
     escaped as escaped,
     legend_above as legend_above,
-    on_paper as on_paper,
     placed_axes as placed_axes,
     round_number as round_number,
     save as save,
-    scale_bar as scale_bar,
-    sticks as sticks,
 )
 from .table_columns import (
     ROUNDING as ROUNDING,
@@ -58,4 +54,5 @@ from .table_columns import (
     table_csv as table_csv,
     table_lines as table_lines,
     table_rows as table_rows,
+    table_texts as table_texts,
 )

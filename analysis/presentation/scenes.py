@@ -1,4 +1,4 @@
-"""A design seen from the front and above: outlines, balls, styli."""
+"""A volume seen from the front and above, and vectors in it."""
 
 from __future__ import annotations
 
@@ -9,8 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from ballplate.simulator.design.arrays import Design
-from ballplate.simulator.design.measurement import locations, nominal_state
 from ballplate.simulator.inputs.number_arrays import Array, Flags
 
 from .svg import (
@@ -40,22 +38,6 @@ MOST_NAMES, LETTERS = 8, 24
 
 
 @dataclass(frozen=True, eq=False)
-class DrawnPosition:
-    """A projected position: outline (k, 2), read balls (m, 2), styli (n, 2, 2) from tip to
-    reference point.
-
-    `number` counts from 1 in the order of the file; `depth` increases away from the eye.
-    """
-
-    number: int
-    name: str
-    outline: Array
-    balls: Array
-    styli: Array
-    depth: float
-
-
-@dataclass(frozen=True, eq=False)
 class Box:
     """A projected volume, in metres: its edges (k, 2, 2), hidden ones marked.
 
@@ -75,41 +57,6 @@ class Box:
 def names_fit(names: Sequence[str]) -> bool:
     """Return whether positions are few and their names short enough to label a drawing."""
     return len(names) <= MOST_NAMES and all(len(name) <= LETTERS for name in names)
-
-
-def scene(design: Design) -> tuple[Box, list[DrawnPosition]]:
-    """Return the projected volume and positions of a design, rear first; one in two dimensions is
-    seen from above.
-    """
-    view, towards = projection(design.dimension)
-    volume = design.machine.volume
-    points = locations(design, nominal_state(design), design.readings)
-    places = []
-    for k, name in enumerate(design.positions.names):
-        of_position = np.flatnonzero(design.readings.position == k)
-        if not len(of_position):
-            continue
-        balls = points[of_position]
-        _, first = np.unique(design.readings.ball[of_position], return_index=True)
-        drawn = first[:: -(-len(first) // MOST_BALLS)]
-        used = np.unique(design.readings.probe[of_position])
-        # All styli at the ball nearest to the middle, where they hide least.
-        middle = balls[np.linalg.norm(balls - balls.mean(axis=0), axis=1).argmin()]
-        styli = np.stack(
-            [np.stack([middle, middle - design.probes.offsets[probe]]) for probe in used]
-        )
-        places.append(
-            DrawnPosition(
-                k + 1,
-                name,
-                hull(balls @ view.T),
-                balls[drawn] @ view.T,
-                styli @ view.T,
-                float(balls.mean(axis=0) @ towards) if design.dimension == 3 else 0.0,
-            )
-        )
-    places.sort(key=lambda place: -place.depth)
-    return box(volume.lower, volume.upper), places
 
 
 def box(lower: Array, upper: Array) -> Box:

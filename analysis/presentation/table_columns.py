@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     import pandas
 
 FACTORS = {"mm": 1e3, "µm": 1e6, "µrad": 1e6, "ppm": 1e6, "arcsec": math.degrees(3600.0)}
+FACTORS |= {"mm (mrad)": 1e3, "µm (µrad)": 1e6}
 
 # Lengths and angles below this, in metres and radians, are rounding.
 ROUNDING = 1e-15
@@ -43,6 +44,13 @@ def table_lines(
 
     `unknown` replaces NaN.
     """
+    return aligned(*table_texts(columns, items, without, unknown))
+
+
+def table_texts(
+    columns: Columns, items: Sequence[Any] = (), without: str | None = None, unknown: str = "-"
+) -> tuple[list[tuple[str, ...]], list[bool]]:
+    """Return the headings and cells of `table_lines`, row by row, and which columns are numbers."""
     texts, right = [], []
     for heading, _, values, form, factors in _columns_read(columns, items):
         if heading != without:
@@ -50,7 +58,7 @@ def table_lines(
             forms = repeat(form) if is_one else _values(form, items)
             texts.append([heading, *map(_text, values, forms, factors, repeat(unknown))])
             right.append(any(isinstance(v, int | float) and type(v) is not bool for v in values))
-    return aligned(list(zip(*texts, strict=True)), right)
+    return list(zip(*texts, strict=True)), right
 
 
 def by_axis(heading: str, values: Array, form: Any = 4, letters: Sequence[str] = "xyz") -> Data:

@@ -12,7 +12,6 @@ from ballplate.simulator.design import Design
 from .design_views import volume_view
 from .document import Page, PageSection, facts_list, introduction, written
 from .elements import Html, element, joined, note, sentence, table
-from .information_section import information_section
 from .length_sections import lengths_section
 from .quoted import QuotedData
 from .residual_sections import reliability_section
@@ -28,8 +27,8 @@ from .uncertainty_sections import (
 FOOT = (
     "Lengths are in micrometres and angles in microradians unless stated otherwise; u are standard"
     " uncertainties, U = k u expanded ones, predicted at zero machine error. Every value but those"
-    " of lengths throughout the volume is that of ballplate run, reliability, check --suggest, run"
-    " --errors or sheet with --json: its data-path names the command and the path in the output."
+    " of lengths throughout the volume and of a part is that of ballplate run, reliability, check"
+    " --suggest or sheet with --json: its data-path names the command and the path in the output."
 )
 
 
@@ -37,7 +36,8 @@ FOOT = (
 class DesignContents:
     """Contents of a page of a design: plain data as printed by the commands, by the command's
     name; the `design`; `target` as text; the `file` and its assumptions. `unreliable` is the
-    reason why there is no reliability among the data.
+    reason why there is no reliability among the data; `part` has sections on the dimensions of a
+    part.
     """
 
     title: str
@@ -47,6 +47,7 @@ class DesignContents:
     unreliable: str
     file: str
     facts: Sequence[tuple[str, str]]
+    part: Sequence[PageSection] = ()
 
 
 def design_page(contents: DesignContents) -> str:
@@ -56,13 +57,13 @@ def design_page(contents: DesignContents) -> str:
     sections = [
         PageSection("volume", "The experiment", _experiment(contents)),
         PageSection("rank", "What the readings determine", _rank(run)),
-        *_informing(quoted),
         PageSection("suggestions", "Suggested changes", _suggestions(quoted)),
         PageSection(
             "uncertainties",
             "Uncertainties",
             joined([uncertainty_table(run), task_table(run), _influences(run)]),
         ),
+        *contents.part,
         PageSection("assumptions", "What is assumed", _assumptions(run)),
         PageSection(
             "lengths",
@@ -76,14 +77,6 @@ def design_page(contents: DesignContents) -> str:
     verdict = _verdict(run, contents.target)
     top = introduction(verdict, _is_good(run), contents.file)
     return written(Page(contents.title, top, sections, FOOT))
-
-
-def _informing(quoted: Mapping[str, QuotedData]) -> list[PageSection]:
-    """Section on errors and positions, unless the page is without it."""
-    if "errors" not in quoted:
-        return []
-    section = information_section(quoted["errors"])
-    return [PageSection("errors", "Errors and positions", section)]
 
 
 def _experiment(contents: DesignContents) -> Html:

@@ -9,6 +9,7 @@ from ballplate.extensions.diagnosis.redundancy import reliability_of
 from ballplate.results import Fit, labels, reading_residuals
 from ballplate.simulator.design import measured
 
+from .design_contents import part_sections
 from .fit_page import FitContents, PlateResiduals, fit_page
 from .page_facts import assumptions, target_in_words, unjudged
 
@@ -47,6 +48,7 @@ def page_of_fit(fit: Fit) -> str:
         (experiment.source.name, *files),
         facts,
         fit.lack_of_fit.caveat,
+        part_sections(fit.design, fit.quantities),
     )
     return fit_page(contents)
 

@@ -54,7 +54,7 @@ class FitContents:
     """Contents of a page of a fit: plain data of the fit and of its design's reliability (or the
     reason `unreliable`); the reason for untested residuals, possibly empty; `kinds` of the
     estimates by name; `target` as text; source `files` and
-    assumptions; the `caveat` on the target.
+    assumptions; the `caveat` on the target; sections on the dimensions of a `part`.
     """
 
     title: str
@@ -68,6 +68,7 @@ class FitContents:
     files: Sequence[str]
     facts: Sequence[tuple[str, str]]
     caveat: str
+    part: Sequence[PageSection] = ()
 
 
 def fit_page(contents: FitContents) -> str:
@@ -110,6 +111,7 @@ def _results(fit: QuotedData, contents: FitContents) -> list[PageSection]:
             "Uncertainties and target",
             joined([uncertainty_table(fit, contents.caveat), task_table(fit, contents.caveat)]),
         ),
+        *contents.part,
         PageSection("curves", "Error curves", curves_section(fit)),
         PageSection(
             "asked", "What the readings contradict", diagnosis_section(fit, contents.untested)

@@ -20,7 +20,7 @@ from ballplate.simulator.design import locations
 from ballplate.simulator.estimation import Linearisation, linearise
 from ballplate.simulator.experiment import Experiment, Position, lay_out
 from ballplate.simulator.geometry import ball_coordinates, even_grid, without_rigid_motion
-from ballplate.simulator.inputs import Target
+from ballplate.simulator.inputs import Target, service
 from ballplate.uncertainty import Quantity, uncertainties
 
 from ..planning import run_sheet
@@ -44,7 +44,10 @@ def summary(experiment: Experiment, moving: bool = False) -> dict[str, Any]:
     start = perf_counter()
     design, target = lay_out(experiment), experiment.target_uncertainty
     linearisation = linearise(design)
-    quantities = uncertainties(linearisation, target=target, symbols=("U6", "tasks"))
+    # Dimensions take a second.
+    symbols = ("U6", "tasks") if moving else ("U6", "tasks", "dimensions")
+    quantities = uncertainties(linearisation, target=target, symbols=symbols)
+    part = quantities.get("dimensions")
     expected, lengths = experiment.expected_rank_deficiency, quantities.get("U6")
     judged = None if moving else verdict(linearisation, expected, target)
     return {
@@ -62,6 +65,7 @@ def summary(experiment: Experiment, moving: bool = False) -> dict[str, Any]:
         "shares": _shares(experiment, quantities),
         "met": _met(quantities, linearisation.deficiency == (expected or 0), judged),
         "worst": _worst(linearisation, lengths),
+        "part": part and service("part_for_studio")(design, part),
         "doubts": experiment.doubts,
         "seconds": perf_counter() - start,
     }
@@ -74,7 +78,7 @@ def _shares(experiment: Experiment, quantities: Mapping[str, Quantity]) -> list[
         + (
             f"{quantity.count:,} distances are within the target {target_in_words(experiment)}"
             if quantity.symbol == "U6"
-            else "the measuring tasks are within their targets"
+            else f"the {quantity.description} are within their targets"
         )
         + f" ({uncertainty_words(quantity.coverage_factor)})"
         for quantity in quantities.values()

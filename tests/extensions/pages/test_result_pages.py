@@ -128,13 +128,10 @@ def test_every_figure_of_a_designs_page_is_that_of_the_json(variant: str) -> Non
     grid = (7, 7) if variant == "plane" else (5, 5, 5)
     data["lengths"] = length_map(experiment, grid).to_dict()
     data["sheet"] = bp.sheet(experiment).to_dict()
-    data["errors"] = bp.information(experiment).to_dict()
     assert assert_quoted(page, data) > 100
     assert ('class="verdict bad"' in page) == is_deficient
     shown = {one.text for one in ResultPage(page).shown}
     assert shown.issuperset(data["run"]["undetermined"])
-    heat = re.findall(r'class="part heat-(\d)"><data value="([-+.\de]+)"', page)
-    assert all(int(one) == min(int(8 * float(part)), 7) for one, part in heat)
 
 
 @pytest.mark.parametrize("met", ["some", "all", "none", "no target"])

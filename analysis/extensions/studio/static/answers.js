@@ -91,9 +91,15 @@ export function figures() {
   if (!state.pending && $("said").textContent !== said) $("said").textContent = said;
   fill($("counts"), lines(rank
     ? [`${rank.parameters} parameters from ${rank.observations} observations`]
-    : []));
+    : []), dimensions(design?.part?.dimensions ?? []));
   directions(rank?.directions ?? []);
 }
+
+// Dimensions of the part in their worst places: uncertainty as a share of the limit.
+const dimensions = (found) => (found.length ? make("ol", { class: "scrolled" },
+  found.map(({ name, share: part, held }) => make("li", { class: held ? "" : "warn" },
+    `${name}: ${rounded(100 * part)} % of the limit `,
+    make("progress", { value: Math.min(part, 1), "aria-label": "share of the limit" })))) : null);
 
 function message({ line, what, text }) {
   const where = line ? button(`line ${line}`, () => show_line(line),

@@ -180,6 +180,7 @@ export class View {
       ...this.frame(),
       this.lines(this.outlines.map((outline) => [...outline, outline[0]]), "outline"),
       ...this.boxes.map((ends) => this.block(cornersOf(boxOf(ends.map(vector))), "forbidden")),
+      ...(this.design.part?.boxes ?? []).map((box) => this.block(box, "workpiece")),
       ...[...plates, ...this.offered].map((plate) => this.plate(plate)),
       this.lines(this.motions ? this.lattice() : [], "lattice"),
       ...this.arrows(),
