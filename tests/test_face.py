@@ -21,6 +21,7 @@ from tests.extensions.sweeps.support import small_sweep
 
 QUICKSTART = "designs/quickstart.yaml"
 MACHINE = "designs/park/machines/npl-like.yaml"
+PART = "designs/parts/block.yaml"
 TABLE = "designs/gilsinn/table-1.csv"
 REAL = "designs/hocken_borchardt/real.yaml", "designs/hocken_borchardt/real-readings.csv"
 GAUGE = "designs/hurt_foss/bryan-gauge.yaml", "designs/hurt_foss/bryan-gauge-readings.csv"
@@ -47,6 +48,14 @@ def printed(capsys: pytest.CaptureFixture[str], *arguments: str) -> Any:
         (
             lambda: bp.spline(TABLE, y="finish_error", points="12-32", start_slope="0"),
             ("spline", TABLE, "--y=finish_error", "--points=12-32", "--start-slope=0"),
+        ),
+        (
+            lambda: bp.acceptance(design=QUICKSTART, mpe="1 um", point_repeatability="0.2 um"),
+            ("acceptance", f"--design={QUICKSTART}", "--mpe=1 um", "--point-repeatability=0.2 um"),
+        ),
+        (
+            lambda: bp.part(PART, QUICKSTART, draws=2, seed=4),
+            ("part", PART, f"--design={QUICKSTART}", "--draw=2", "--seed=4"),
         ),
         (lambda: bp.reproduce("npl", "6.1.2"), ("reproduce", "npl", "--experiment=6.1.2")),
         (
@@ -146,6 +155,36 @@ def fitted() -> Fit:
     return bp.fit(QUICKSTART, bp.simulate(QUICKSTART))
 
 
+def test_a_measured_part_is_that_of_the_command(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """From a fit and a frame, as from files; of scale readings as of centres of tips."""
+    fit, (plan, readings, tips) = fitted(), (tmp_path / name for name in ("m.yaml", "r", "t"))
+    bp.write_map(fit.to_map(), plan)
+    laid = bp.part(PART, fitted=str(plan)).laid
+    assert laid is not None
+    names = [
+        (*key, str(k - rows.start + 1))
+        for key, rows in laid.points.rows.items()
+        for k in range(rows.start, rows.stop)
+    ]
+    frame = pd.DataFrame(names, columns=["place", "feature", "point"])
+    columns, x = ["x_mm", "y_mm", "z_mm"], 1e3 * laid.points.readings
+    # Rounded to a tenth of a micrometre, so that files and frames have the same numbers.
+    frame[columns] = (x + np.random.default_rng(1).normal(scale=1e-3, size=x.shape)).round(4)
+    frame.to_csv(readings, index=False)
+    found = bp.part(PART, fitted=fit, readings=frame)
+    told = printed(capsys, "part", PART, f"--map={plan}", f"--readings={readings}")
+    assert found.to_dict()["dimensions"] == told["dimensions"]
+    frame[columns] = (frame[columns] + 1e3 * laid.machine.offsets[laid.points.probes]).round(4)
+    frame.to_csv(tips, index=False)
+    arguments = f"--map={plan}", f"--readings={tips}", "--coordinates=tip centres"
+    again = printed(capsys, "part", PART, *arguments)
+    measured, others = ([one["measured"] for one in of["dimensions"]] for of in (told, again))
+    np.testing.assert_allclose(measured, others, rtol=0, atol=1e-12)
+    assert max(map(abs, measured)) > 1e-6
+
+
 WRONG: list[tuple[Callable[[], object], type[Exception], str]] = [
     (lambda: bp.run(5), TypeError, "int is neither an experiment nor the path of a file"),
     (lambda: bp.run({}), TypeError, r"dict is neither .* convert it with experiment()"),
@@ -181,7 +220,6 @@ WRONG: list[tuple[Callable[[], object], type[Exception], str]] = [
     (lambda: bp.map(MACHINE, points=3), ValueError, "points need a line"),
     (lambda: bp.map(MACHINE, line="y = 3"), ValueError, "y"),
     (lambda: bp.spline(TABLE, knot="none"), TypeError, '"knot" is unknown; did you mean "knots"'),
-    (lambda: bp.spline(TABLE, straight=1), TypeError, "straight=1; give a list"),
     (
         lambda: bp.spline(TABLE, y="finish_error", start_slope="flat"),
         ValueError,
@@ -203,11 +241,25 @@ WRONG: list[tuple[Callable[[], object], type[Exception], str]] = [
     (lambda: bp.reach(QUICKSTART, unknowns="rows"), ValueError, "known: repeatability"),
     (lambda: bp.budget(QUICKSTART, by=None), ValueError, 'by: "None" is unknown; known: axis'),
     (lambda: bp.sweep(3), TypeError, "experiment=3; give the path of a file"),
+    (lambda: bp.part(3, QUICKSTART), TypeError, "file=3; give the path"),
+    (lambda: bp.part(PART), ValueError, "give one of a design and a map"),
+    (lambda: bp.part(PART, QUICKSTART, "map.yaml"), ValueError, "give one of a design and a map"),
+    (lambda: bp.part(PART, QUICKSTART, readings="a.csv"), ValueError, "readings need a map"),
+    (lambda: bp.part(PART, 5), TypeError, "int is neither an experiment nor the path of a file"),
+    (lambda: bp.part(PART, fitted=5), TypeError, "fitted=5; give a fit"),
+    (lambda: bp.part(PART, fitted="a.yaml", readings=5), TypeError, "readings=5; give the path of"),
+    (lambda: bp.part(PART, QUICKSTART, draws=-1), ValueError, "draws=-1; give 0 at least"),
+    (lambda: bp.part(PART, QUICKSTART, seed=0.5), TypeError, "seed=0.5; give a whole number"),
+    (
+        lambda: bp.part(PART, QUICKSTART, coordinates="tips"),
+        ValueError,
+        'coordinates: "tips" is unknown',
+    ),
+    (lambda: bp.part(PART, REAL[0]), bp.ExperimentError, "variant"),
     (lambda: bp.run(QUICKSTART, seed=5), ValueError, "apply to trials or until only"),
     (lambda: bp.run(QUICKSTART, workers=3), ValueError, "apply to trials or until only"),
     (lambda: bp.check(QUICKSTART, goals=5), TypeError, "goals=5; give texts such as"),
-    (lambda: bp.repair(bp.load(QUICKSTART)), TypeError, "path=<Experiment .*; give the path"),
-    (lambda: bp.run(QUICKSTART).plot(5), TypeError, "path=5; give the path"),
+    (lambda: bp.map(MACHINE, grid=(2, 2, 2)).plot(5), TypeError, "path=5; give the path"),
     (lambda: bp.run(QUICKSTART).to_csv(5), TypeError, "path=5; give the path"),
     (
         lambda: bp.reliability(QUICKSTART, power=0),
@@ -264,7 +316,8 @@ def test_tables_are_written_as_well(tmp_path: Path) -> None:
     found = bp.run(QUICKSTART)
     text = found.to_csv(tmp_path / "a.csv")
     assert (tmp_path / "a.csv").read_text("utf-8") == text == found.to_csv()
-    for write in (found.to_csv, found.plot):
+    drawn = bp.map(MACHINE, grid=(2, 2, 2))
+    for write in (found.to_csv, drawn.plot):
         ending = "csv" if write == found.to_csv else "svg"
         with pytest.raises(FileNotFoundError, match="there is no folder .*none; make it, or name"):
             write(tmp_path / "none" / f"a.{ending}")
@@ -291,13 +344,10 @@ def test_residuals_in_space_are_drawn_as_seen() -> None:
 
 
 def test_other_results_draw_themselves(tmp_path: Path) -> None:
-    curve = bp.spline(TABLE, y="finish_error", points="12-32")
     for k, plot in enumerate(
         (
             bp.map(MACHINE, grid=(2, 2, 2)).plot,
             bp.map(MACHINE, line="y = 300 mm, z = 200 mm").plot,
-            curve.plot,
-            curve.plot_whiskers,
         )
     ):
         figure = plot(tmp_path / f"{k}.svg")

@@ -13,7 +13,7 @@ from ballplate.cli import main
 from ballplate.cli._parsers import module_of
 from ballplate.extensions.planning import campaign_choice
 
-from tests.cli.walk import BALLS, DESIGN, WALK
+from tests.cli.walk import BALLS, DESIGN, FACE, PART, SPACE, WALK
 from tests.extensions.planning.small_pool import TEXT as POOL
 from tests.extensions.sweeps.stores import axis, done, made_up
 from tests.reference.copies import copy_file, copy_tree
@@ -23,14 +23,14 @@ from tests.reference.copies import copy_file, copy_tree
 def shelf(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """All that the commands read."""
     folder = tmp_path_factory.mktemp("shelf")
-    (folder / "design.yaml").write_text(DESIGN, encoding="utf-8")
-    (folder / "balls.csv").write_text(BALLS, encoding="utf-8")
-    (folder / "pool.yaml").write_text(POOL, encoding="utf-8")
+    texts = {"design.yaml": DESIGN, "space.yaml": SPACE, "part.yaml": PART, "face.csv": FACE}
+    for name, text in {**texts, "balls.csv": BALLS, "pool.yaml": POOL}.items():
+        (folder / name).write_text(text, encoding="utf-8")
     sphere = "UNITS/MM\nFA(FIRST_A)=FEAT/SPHERE,CART,50,50,0,22\nENDFIL\n"
     (folder / "report.dmo").write_text(sphere, encoding="utf-8")
     axes = "axes: {repeatability: {path: machine.repeatability, values: [1 um, 2 um]}}"
     (folder / "sweep.yaml").write_text(f"title: two\nbase: design.yaml\n{axes}\n", encoding="utf-8")
-    for name in ("drawn.yaml", "done.csv"):
+    for name in ("drawn.yaml", "done.csv", "touched.csv"):
         (folder / name).write_text("is not read\n", encoding="utf-8")
     copy_file("designs/gilsinn/table-1.csv", folder / "points.csv")
     copy_file("designs/park/machines/measured-errors.yaml", folder / "machine.yaml")
@@ -46,7 +46,8 @@ def shelf(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "corners.csv").write_text("name,x_mm,y_mm\nA,50,50\nB,450,50\n", encoding="utf-8")
     fit = ["fit", str(folder / "design.yaml"), str(readings), "-o", str(folder / "map.yaml")]
     assert main(fit) == 0
-    shutil.copy(folder / "map.yaml", folder / "second-map.yaml")
+    for name in ("second-map.yaml", "space-map.yaml"):
+        shutil.copy(folder / "map.yaml", folder / name)
     # In the plane, where a model has few curves to be drawn.
     few = {"kind": "kinematic", "position_coefficients": 2, "rotation_coefficients": 1}
     own = bp.load(folder / "design.yaml").with_({"error_model": few})

@@ -33,6 +33,11 @@ SWEEP = "sweep sweep.yaml --workers 1"
 NPL = "reproduce npl --quick --experiment 5.2"
 REVERSAL = "fit dummy.yaml dummy-readings.csv --variant 'with scale' --estimator reversal"
 
+LIMITS = "acceptance --mpe '5 um' --draws 500"
+TEST = f"{LIMITS} --point-repeatability '0.4 um' --design plate.yaml"
+
+PART = "part part.yaml --design plate.yaml"
+
 TABLE: tuple[tuple[str, str, str], ...] = (
     ("init out.yaml", "--machine", "title: moving bridge"),
     (init(), "--example", "--example take no data sheet"),
@@ -46,9 +51,9 @@ TABLE: tuple[tuple[str, str, str], ...] = (
     ("check pair.yaml", "--variant coarse", "without: pair[plain]"),
     ("check plate.yaml", "--format junit", '<testsuite name="plate.yaml"'),
     ("check deficient.yaml", "--suggest", "repair 1, in the file: positions[z high]"),
-    ("check deficient.yaml", "--fix", "--file deficient.yaml"),
     ("check plate.yaml", "--goal 'U6 average 0.1 um'", "status 1"),
     ("check plate.yaml --goal lengths", "--share 50%", "50 % of lengths (U6)"),
+    ("check measured.yaml", "--goal dimensions", "12 of 12 dimensions within their targets"),
     ("check certified/weak.yaml", "--fail-weak", "status 1"),
     ("run pair.yaml", "--variant coarse", "pair[coarse]"),
     ("run plate.yaml", "--trials 4", "Monte Carlo: 4 data sets"),
@@ -71,7 +76,6 @@ TABLE: tuple[tuple[str, str, str], ...] = (
     (f"{PLAN} --positions 2", "-o out.yaml", "# Chosen by ballplate plan from pool.yaml"),
     (f"{PLAN} --positions 2", "--sheet out.html", "--file out.html"),
     (f"{PLAN} --positions 2", "--curve", "3 positions   1.331"),
-    (f"{PLAN} --positions 2", "--plot out.svg", "positions P1, P2 in the volume"),
     (f"{PLAN} --positions 2 -o out.yaml", "--quiet", "without:  written\n"),
     ("simulate pair.yaml -o -", "--variant coarse", "position,ball,probe"),
     ("simulate plate.yaml -o -", "-o out.csv", "--file out.csv"),
@@ -152,7 +156,6 @@ TABLE: tuple[tuple[str, str, str], ...] = (
     ("diff machine.yaml map.yaml --grid 2", "--fail", "status 1"),
     ("diff machine.yaml map.yaml --grid 2", "--stated '100 um'", "as well known as is stated"),
     (MAPS, "-o out.csv", "kind,figure,difference,standard uncertainty"),
-    (MAPS, "--plot out.svg", "<title>again less map"),
     ("diff plate.yaml plate.yaml", "--readings plate.csv plate-again.csv", "second less first"),
     (
         "diff plate.yaml plate.yaml --readings plate.csv plate-again.csv",
@@ -181,6 +184,40 @@ TABLE: tuple[tuple[str, str, str], ...] = (
     ("'map --curves' machine.yaml", "--error EXX", "without: EYX"),
     ("'map --curves' machine.yaml --format csv", "--points 3", "without: EYX,,20,"),
     ("'map --curves' machine.yaml", "--format csv", "EXX,,"),
+    (TEST, "--mpl '1.5 um'", "chance to pass 0.0"),
+    (TEST, "--probe right", "E150 by right"),
+    (TEST, "--gauge '2 um'", "  2.00  "),
+    (TEST, "--seed 7", "seed 7;"),
+    (TEST, "--report out.html", "<h1>acceptance test</h1>"),
+    (f"{TEST} --report out.html", "--quiet", "without: out.html written"),
+    (
+        "acceptance --mpe '5 um' --point-repeatability '0.4 um' --map map.yaml",
+        "--draws 99",
+        "99 te",
+    ),
+    ("acceptance --point-repeatability '0.4 um' --design plate.yaml", "--mpe '5 um'", "chance"),
+    (f"{LIMITS} --design plate.yaml", "--point-repeatability '0.4 um'", "chance to pass"),
+    (f"{LIMITS} --point-repeatability '0.4 um'", "--design plate.yaml", "chance to pass"),
+    (f"{LIMITS} --point-repeatability '0.4 um'", "--map map.yaml", "chance to pass"),
+    (LIMITS, "--readings lengths.csv", "4 sets of three"),
+    (
+        f"{LIMITS} --point-repeatability '0.4 um' --design pair.yaml",
+        "--variant coarse",
+        "pair[coarse]",
+    ),
+    (TEST, "--report out.html", "<html"),
+    (PART, "--report out.html", "<html"),
+    (PART, "--points to-touch.csv", "place,feature,point,probe,x_mm,y_mm,z_mm"),
+    (PART, "--draw 3", "u drawn"),
+    (f"{PART} --draw 3", "--seed 4", "0.0254"),
+    ("part part.yaml", "--design plate.yaml", "12 of 12 within 20 %"),
+    ("part part.yaml", "--map map.yaml", "12 of 12 within 20 %"),
+    ("part part.yaml --map map.yaml", "--readings part-readings.csv", "accepted  µm"),
+    (
+        "part part.yaml --map map.yaml --readings part-tips.csv",
+        "--coordinates 'tip centres'",
+        "accepted  µm",
+    ),
     ("spline table-1.csv --y finish_error", "--x nominal_x", "finish error against nominal x"),
     ("spline table-1.csv", "--y finish_error", "finish error against arc length"),
     ("spline curve.csv", "--points 1-8", "8 points, curve from 0 mm to 140 mm"),
@@ -188,22 +225,12 @@ TABLE: tuple[tuple[str, str, str], ...] = (
     ("spline curve.csv", "--knots '50 mm, 100 mm'", "2 knots at 50, 100 mm"),
     ("spline curve.csv", "--start '-10 mm'", "curve from -10 mm"),
     ("spline curve.csv", "--end '230 mm'", "to 230 mm"),
-    ("spline curve.csv", "--boundary '100 mm'", "share value and slope at 100 mm"),
-    (
-        "spline table-1.csv --y finish_error --knots none",
-        "--corner '60 mm'",
-        "features meet at a corner at 60 mm",
-    ),
-    ("spline curve.csv --boundary '100 mm'", "--straight 1", "feature 1 is a straight line"),
     ("spline curve.csv", "--start-value '3 um'", "prescribed: value 3 µm at 0 mm"),
     ("spline curve.csv", "--start-slope '2 um/mm'", "prescribed: slope 2 µm/mm at 0 mm"),
     ("spline curve.csv", "--end-value '3 um'", "prescribed: value 3 µm at 220 mm"),
     ("spline curve.csv", "--end-slope '2 um/mm'", "prescribed: slope 2 µm/mm at 220 mm"),
     ("spline curve.csv", "--powers global", "polynomials of u, the position, in mm"),
     ("spline curve.csv", "-o out.csv", "# error = c0 + c1 u"),
-    ("spline table-1.csv --y finish_error --every 3", "--compensated out.csv", "compensated_x_mm"),
-    ("spline curve.csv", "--plot out.svg", "<title>error against position"),
-    ("spline table-1.csv --y finish_error", "--whiskers out.svg", "as bars normal to a profile"),
     (SWEEP, "--store out.sqlite", "out.sqlite: 6 cases, 2 done, 4 failed\n"),
     (SWEEP, "--dry-run", "0: size 250 mm, balls few"),
     (SWEEP, "--retry-failed", "4 failed (1 of them before)"),

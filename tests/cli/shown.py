@@ -109,6 +109,14 @@ def _write_tables(folder: Path) -> None:
         for name, row in zip(names, places, strict=True)
     ]
     write("centres.csv", head, [names, centres])
+    table = (folder / "part-readings.csv").read_text(encoding="utf-8")
+    heads, *touched = csv.reader(table.splitlines())
+    probes = ["right" if feature == "side" else "down" for _, feature, *_ in touched]
+    tips = [
+        [round(float(x) + y, 4) for x, y in zip(row[3:], OFFSETS[probe], strict=True)]
+        for row, probe in zip(touched, probes, strict=True)
+    ]
+    write("part-tips.csv", heads, [[row[:3] for row in touched], tips])
     write("features.csv", ["feature", *head[3:]], [[["/".join(name)] for name in names], places])
     before = ["", *(position for position, *_ in names[:-1])]
     blank = [[a * (a != b), *c] for (a, *c), b in zip(names, before, strict=True)]

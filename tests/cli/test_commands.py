@@ -239,9 +239,11 @@ def test_shipped_files_name_their_schema() -> None:
     for path in Path("designs").rglob("*.yaml"):
         first = path.read_text(encoding="utf-8").splitlines()[0]
         named = first.partition("$schema=")[2]
-        expected = {"sweeps": "sweep-schema.json", "machines": "machine-schema.json"}.get(
-            path.parent.name, "schema.json"
-        )
+        expected = {
+            "sweeps": "sweep-schema.json",
+            "machines": "machine-schema.json",
+            "parts": "part-schema.json",
+        }.get(path.parent.name, "schema.json")
         assert (path.parent / named).resolve() == Path("designs", expected).resolve(), path
 
 
@@ -259,7 +261,7 @@ def test_usage_is_status_2(arguments: list[str], capsys: pytest.CaptureFixture[s
 DESIGNS = sorted(
     path
     for path in Path("designs").rglob("*.yaml")
-    if path.parent.name not in ("sweeps", "machines")
+    if path.parent.name not in ("sweeps", "machines", "parts")
 )
 # Plates in space and in the plane, splines, bars and gauges, a published deficiency.
 FEW = (

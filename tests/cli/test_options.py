@@ -20,8 +20,8 @@ from tests.cli.walk import WALK, commands
 
 # Progress bars are all that they print beside their results, and only on a terminal.
 SILENT = (
-    *("check", "compare", "correct", "diff", "map", "map --curves", "reach", "reproduce", "run"),
-    *("run --errors", "run --reliability", "schema", "spline", "studio"),
+    *("check", "compare", "correct", "diff", "map", "map --curves", "part", "reach", "reproduce"),
+    *("run", "run --errors", "run --reliability", "schema", "spline", "studio"),
     *("sweep", "sweep --export", "sweep --report"),
 )
 # Shown by other tests, as the page and what needs files of its own; or what no small command shows: a

@@ -19,18 +19,7 @@ from ballplate.cli import main
 from ballplate.cli.outputs import OutputAction
 
 from tests.cli import wording
-from tests.cli.walk import (
-    BALLS,
-    DESIGN,
-    LEFT_OUT,
-    METAVARS,
-    WALK,
-    commands,
-    content,
-    label,
-    line,
-    refused,
-)
+from tests.cli.walk import BALLS, DESIGN, METAVARS, WALK, commands, content, label, line, refused
 
 __all__ = ["BALLS", "DESIGN"]
 WRITING = [(command, option) for command, walk in WALK.items() for option in walk.writes]
@@ -134,10 +123,10 @@ class TestToldBeforeTheWork:
             walk = WALK[command]
             path = tmp_path / walk.writes[option]
             told = f"ballplate {command}: {option} {path} would overwrite ", "which is read"
-            for name in (*walk.reads.values(), *walk.also):
+            for one, name in (*walk.reads.items(), *(("", name) for name in walk.also)):
                 for make_link, force in ((os.symlink, ()), (os.link, ("--force",))):
                     make_link(files / name, path)
-                    arguments = line(command, files, {option: path}, *force, reads=LEFT_OUT)
+                    arguments = line(command, files, {option: path}, *force, reads=(one,))
                     refused(arguments, capsys, 2, *told)
                     path.unlink()
         assert content(files) == before

@@ -24,7 +24,6 @@ from ballplate.cli.outputs import text_writer, write_outputs
 from tests.cli import wording
 from tests.cli.cuts import remains
 from tests.cli.walk import DESIGN, WALK, content, line
-from tests.extensions.repair.test_check_fix import SHIFTED as OPEN
 
 WRITING = [command for command, walk in WALK.items() if walk.writes]
 
@@ -73,7 +72,7 @@ def fault(
 
 FAULTS = ("limit of size", "full disk at the last", "held open by another program", "interrupted")
 # Files of several kinds, on the screen too; other commands write and print by the same functions.
-SOME = ("simulate", "sheet", "run --reliability", "map", "sweep --export", "check")
+SOME = ("simulate", "sheet", "run --reliability", "map", "sweep --export")
 
 
 def some_and(commands: Iterable[str], some: Sequence[str] = SOME) -> list[Any]:
@@ -152,9 +151,6 @@ def cuts(
         command: dict.fromkeys(WALK[command].writes.values(), "old") if is_there else {}
         for command in lines
     }
-    if is_there and "check" in commands:
-        lines["check"] = ["check", "--fix", str(folder / "open.yaml")]
-        before["check"] = {"open.yaml": OPEN}
     after: dict[str, dict[str, str]] = {}
     for left in remains(lines=lines, folder=str(folder), before=before, **task):
         if left["cut"]:

@@ -31,6 +31,27 @@ target_uncertainty: 2 um
 evaluation: {points: {random: 10, seed: 1}}
 seed: 1
 """
+# On three axes, and a part that is measured there.
+SPACE = """\
+title: a plate in three planes
+machine: {volume: [500 mm, 500 mm, 500 mm], repeatability: 1 um}
+error_model: {kind: metric}
+artefacts: {plate: {kind: balls, file: balls.csv}}
+positions:
+  - {name: low, plane: z, level: 50 mm, corner: {x: 50 mm, y: 50 mm}}
+  - {name: side, plane: x, level: 50 mm, corner: {y: 50 mm, z: 50 mm}}
+  - {name: front, plane: y, level: 50 mm, corner: {z: 50 mm, x: 50 mm}}
+calibration:
+  - {kind: distances, artefact: plate, pairs: [[a, b]], standard_uncertainty: 0.5 um}
+"""
+PART = """\
+part: a face
+probing: {point_repeatability: 1 um, tip: {diameter: 4}}
+places: {there: {origin: [100, 100, 100]}}
+features: {top: {points: face.csv, fit: plane, normal: z+}}
+dimensions: [{flatness: top, tolerance: 0.1}]
+"""
+FACE = "x_mm,y_mm,z_mm\n0,0,20\n50,0,20\n0,50,20\n50,50,20\n"
 BALLS = "ball,x_mm,y_mm\na,0,0\nb,300,0\nc,0,300\nd,300,310\ne,150,120\n"
 
 # Of files and pictures that a command writes or reads: how their options are shown in its help.
@@ -83,11 +104,11 @@ WALK = {
     "map --curves": Walk({"FILE": "curved-map.yaml"}, {}),
     "diff": Walk(
         {"MAP": "map.yaml", "SECOND": "second-map.yaml", "--readings": "readings.csv"},
-        {"-o": "d.csv", "--plot": "d.svg"},
+        {"-o": "d.csv"},
     ),
     "plan": Walk(
         {"FILE": "pool.yaml", "--from": "drawn.yaml", "--done": "done.csv"},
-        {"-o": "plan.yaml", "--sheet": "sheet.html", "--plot": "plan.svg"},
+        {"-o": "plan.yaml", "--sheet": "sheet.html"},
         ("--positions", "3", "--workers", "1"),
     ),
     "sheet": Walk(
@@ -99,9 +120,25 @@ WALK = {
     "map": Walk(
         {"FILE": "machine.yaml"}, {"--plot": "map.png"}, ("--grid", "2,2,2"), ("measured/exx.csv",)
     ),
+    "acceptance": Walk(
+        {"--design": "design.yaml", "--map": "map.yaml", "--readings": "readings.csv"},
+        {"--report": "test.html"},
+        ("--mpe", "9 um", "--point-repeatability", "1 um", "--draws", "100"),
+        also=BALLS_TOO,
+    ),
+    "part": Walk(
+        {
+            "FILE": "part.yaml",
+            "--design": "space.yaml",
+            "--map": "space-map.yaml",
+            "--readings": "touched.csv",
+        },
+        {"--report": "part.html", "--points": "to-touch.csv"},
+        also=("balls.csv", "face.csv"),
+    ),
     "spline": Walk(
         {"FILE": "points.csv"},
-        {"-o": "s.csv", "--compensated": "m.csv", "--plot": "s.pdf", "--whiskers": "w.svg"},
+        {"-o": "s.csv"},
         ("--y", "semi_finish_error", "--points", "12-32"),
     ),
     "sweep --export": Walk({"STORE": "store.sqlite"}, {"-o": "t.parquet"}, prints=False),
@@ -118,7 +155,9 @@ WALK = {
     "schema": Walk({}, {}),
 }
 # Those that are read only where they are asked for, and not needed to walk through.
-LEFT_OUT = ("--from", "--done", "--store", "--folder", "--designs", "--tasks", "--readings")
+LEFT_OUT = (
+    *("--from", "--done", "--store", "--folder", "--designs", "--tasks", "--readings", "--map"),
+)
 
 
 def small_file(path: Path, **changes: Any) -> Path:
@@ -131,13 +170,15 @@ def line(
     command: str, files: Path, written: dict[str, Path], *more: str, reads: tuple[str, ...] = ()
 ) -> list[str]:
     """The command line that reads the files and writes these; `reads` are further files to be
-    read.
+    read, of which a map is in the place of a design.
     """
     walk = WALK[command]
     words = [command]
     for option, name in walk.reads.items():
+        if option == "--design" and "--map" in reads:
+            continue
         if option not in LEFT_OUT or option in reads:
-            count = 2 if option == "--readings" else 1
+            count = 2 if (command, option) == ("diff", "--readings") else 1
             words += [option] * option.startswith("-") + [str(files / name)] * count
     words += walk.options
     if command in ("simulate", "sweep --export") and "-o" not in written:

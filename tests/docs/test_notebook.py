@@ -36,7 +36,7 @@ def test_cells_are_those_of_the_page() -> None:
     assert len(programs) == 4 and "```" not in sources and ":continued:" not in sources
     pictures = sum(len(cell.get("pictures", ())) for cell in cells)
     data = [o["data"] for c in stored()["cells"] for o in c.get("outputs", []) if "data" in o]
-    assert pictures == len(data) == 3 and sum(len(one["image/png"]) for one in data) < 150e3
+    assert pictures == len(data) == 2 and sum(len(one["image/png"]) for one in data) < 150e3
 
 
 def test_a_notebook_has_what_its_programs_print_and_draw() -> None:

@@ -42,8 +42,8 @@ def test_one_page_lists_all_extras_and_their_packages() -> None:
         (Path("README.md"), "studio designs/quickstart.yaml --no-browser"),
         (Path("README.md"), "run designs/quickstart.yaml --report {folder}/design.html"),
         (
-            Path("docs/how-to/plan-a-campaign.md"),
-            "plan designs/planning/campaign.yaml --hours 4 --plot {folder}/day.svg",
+            Path("docs/how-to/use-the-map.md"),
+            "map designs/park/machines/gec-like.yaml --grid 2,2,2 --plot {folder}/map.svg",
         ),
     ],
     ids=str,

@@ -141,6 +141,7 @@ def test_a_data_sheet_is_not_read_in_metres(divisor: str) -> None:
     ("value", "message"),
     [
         ("750", '"750" has no unit; write for example "750 mm" or "750 um"'),
+        pytest.param(10**309, f'"{10**309}" has no unit; write for example "1', id="no float"),
         (1e-6, '"1e-06" has no unit; write "1e-06 m" if it is in m'),
         (
             "0.4 um (k=2)",

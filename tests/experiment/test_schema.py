@@ -65,5 +65,5 @@ def test_defaults_can_be_written_in_a_file() -> None:
 
 
 def test_the_keys_of_the_file() -> None:
-    of_extensions = {"assumptions"}
+    of_extensions = {"assumptions", "part"}
     assert set(schema()["properties"]) == set(ExperimentSettings.model_fields) | of_extensions

@@ -17,8 +17,14 @@ import pytest
 from ballplate.extensions.certificates.certificate_files import certified_values, read_certificate
 from ballplate.extensions.machine_files import load_machine
 from ballplate.extensions.maps.point_files import read_points as points_to_correct
+from ballplate.extensions.parts.acceptance_readings import acceptance_evaluation
+from ballplate.extensions.parts.acceptance_rules import Agreed
+from ballplate.extensions.parts.measured_parts import read_part_points
+from ballplate.extensions.parts.part_file import load_part
+from ballplate.extensions.parts.part_values import lay_out_part
+from ballplate.extensions.parts.touched import of_design
 from ballplate.extensions.splines.read_points import read_points
-from ballplate.simulator.inputs import ExperimentError
+from ballplate.simulator.inputs import ExperimentError, LengthFunction
 from ballplate.simulator.inputs.tables import read_table
 from ballplate.simulator.readings import read_readings
 
@@ -95,10 +101,28 @@ OTHERS = {
     ),
     "correct.csv": "probe,ball,x_mm,y_mm,z_mm\ndown,a,100.5,200,300\nlong,b,500,500,500.25\n",
 }
+PART = """\
+part: a face
+probing: {point_repeatability: 1 um, tip: {diameter: 4}}
+places: {there: {origin: [300, 300, 300]}}
+features: {top: {points: face.csv, fit: plane, normal: z+}}
+dimensions: [{flatness: top}]
+"""
+FACES = {
+    "face.csv": "x_mm,y_mm,z_mm\n0,0,20.5\n50.5,0,20\n0,50,20.25\n50,50,20.75\n",
+    "touched.csv": (
+        "place,feature,point,x_mm,y_mm,z_mm\nthere,top,1,300.5,300,372\nthere,top,2,350.5,300,372\n"
+        "there,top,3,300,350,372.25\nthere,top,4,350,350,372.1\n"
+    ),
+    "acceptance.csv": (
+        "direction,probe,length_mm,measured_mm\n"
+        "x,down,100.5,100.5001\nx,down,100.5,100.5002\nx,down,100.5,100.5003\n"
+    ),
+}
 NUMBER = re.compile(r"[+-]?[0-9]+\.[0-9]+(?: mm)?")
 # Columns whose entries are names.
 NAMES = re.compile(
-    r"ball|ball_1|ball_2|first|second|probe|position|point|feature|covariance_um2|item"
+    r"ball|ball_1|ball_2|first|second|probe|position|point|feature|covariance_um2|item|place|direction"
 )
 
 
@@ -184,12 +208,20 @@ def test_every_table_is_part_of_what_is_compared(folder: Path, name: str) -> Non
 
 def content_of_others(folder: Path, form: Callable[[str], str]) -> list[Any]:
     experiment = experiment_of(folder, str)
-    write(folder, OTHERS, form)
+    write(folder, OTHERS | FACES, form)
+    (folder / "part.yaml").write_text(PART, encoding="utf-8")
+    part = load_part(folder / "part.yaml")
+    laid = lay_out_part(part, of_design(bp.lay_out(experiment)))
+    agreed = Agreed(LengthFunction(1e-6), 1e-6)
+    test = acceptance_evaluation(folder / "acceptance.csv", agreed)
     machine, volume = folder / "m.yaml", experiment.machine.volume
     machine.write_text(MACHINE, encoding="utf-8")
     return [
         *numbers(load_machine(machine)),
         *numbers(read_points(folder / "spline.csv")),
+        *numbers(part),
+        *numbers(read_part_points(folder / "touched.csv", laid)),
+        *numbers(test),
         *numbers(points_to_correct(folder / "correct.csv", ("down", "long"), "down", volume)),
     ]
 
@@ -199,7 +231,7 @@ def test_tables_that_commands_are_given(folder: Path, form: str) -> None:
     assert content_of_others(folder, FORMS[form]) == content_of_others(folder, str)
 
 
-@pytest.mark.parametrize("number", ["1500.5", "-1.5,1500", "500.25"])
+@pytest.mark.parametrize("number", ["1500.5", "-1.5,1500", "500.25", "50.5", "372.25", "100.5003"])
 def test_every_one_of_these_too(folder: Path, number: str) -> None:
     before = content_of_others(folder, str)
     assert content_of_others(folder, lambda text: text.replace(number, f"{number}1")) != before
@@ -235,6 +267,9 @@ READERS = {
     "analysis/extensions/certificates/certificate_files.py",
     "analysis/extensions/maps/point_files.py",  # correct, map --at
     "analysis/extensions/splines/read_points.py",
+    "analysis/extensions/parts/part_features.py",  # face
+    "analysis/extensions/parts/measured_parts.py",  # touched
+    "analysis/extensions/parts/acceptance_readings.py",  # acceptance
     "analysis/extensions/laboratory/table_forms.py",  # readings that are not plain
     "analysis/extensions/reproduction/published.py",  # a table of the project's own
 }

@@ -21,7 +21,9 @@ from pathlib import Path
 from random import Random
 from unicodedata import category
 
+from ballplate.cli.outputs import OutputAction
 from ballplate.extensions.machine_files.machine_sections import schema as machine_schema
+from ballplate.extensions.parts.part_sections import schema as part_schema
 
 from tests.robustness.command_lines import changed_line, drawn, grammar, parsed, quick
 from tests.robustness.experiments import SEED, SWEEP_WORDS, WORDS
@@ -45,18 +47,20 @@ NAMED = {
     "subsets.yaml": ("quickstart.yaml",),
     "variants.yaml": ("splines.yaml",),
     "machine.yaml": ("exx.csv",),
+    "part.yaml": ("top.csv",),
+    "measured.yaml": ("part.yaml", "top.csv"),
     "npl": ("npl/5.2.yaml",),
     "certified": ("certified/weak.yaml", "certified/weak.json", "certified/weak.csv"),
 }
 # As many points as are accepted take long in what computes them again and again, and rightly so.
+PART_WILD = {"points": ([1000, 1000], [30, 30], 1000, 1, [[0, 0, 0]], "top.csv", "part.yaml")}
 WILD = dict(WORDS.wild) | {"random": (10**9, 1_000_001, 500, 0)}
 EXPERIMENT_WORDS = Vocabulary(WORDS.keys, WORDS.words, tuple(WILD.items()))
 MACHINE_WORDS = vocabulary(machine_schema(), WILD)
+PART_WORDS = vocabulary(part_schema(), WILD | PART_WILD)
 MACHINES = ("machine.yaml", "gec-like.yaml")
 SWEEPS = ("sweep.yaml", "trials.yaml", "ranges.yaml", "subsets.yaml", "variants.yaml")
 
-# Options whose value is read; what other options name is written.
-READ = ("done", "earlier", "results", "designs", "folder", "nominal")
 BESIDE_STORES = ("-wal", "-shm", "-journal", ".lock")
 STATUSES = (0, 1, 2, 3)
 STATUS = "status"
@@ -132,6 +136,8 @@ def _tree(path: Path) -> str:
 
 
 def _words(name: str) -> Vocabulary:
+    if name == "part.yaml":
+        return PART_WORDS
     return (
         MACHINE_WORDS if name in MACHINES else SWEEP_WORDS if name in SWEEPS else EXPERIMENT_WORDS
     )
@@ -170,7 +176,8 @@ def lay_out(kit: Path, case: Case, folder: Path) -> None:
 WARM_UP = (
     "check --suggest --format junit deficient.yaml",
     "run small.yaml --trials 4 --seed 3 --workers 1",
-    "plan pool.yaml --positions 2 --workers 1 --plot out.svg",
+    "plan pool.yaml --positions 2 --workers 1",
+    "map gec-like.yaml --grid 2,2,2 --plot out.svg",
     "'sweep --export' trials.sqlite -o out.parquet",
 )
 
@@ -245,8 +252,8 @@ def _of_files(arguments: tuple[str, ...], folder: Path, before: dict[str, bytes]
 
 
 def _outputs(arguments: tuple[str, ...], folder: Path, before: dict[str, bytes]) -> set[str]:
-    """Names in the folder that the line may write: what options name that are no inputs, and the
-    store of a sweep.
+    """Names in the folder that the line may write: what options for outputs name that is no input,
+    and the store of a sweep.
     """
     options = parsed(arguments)
     if options is None:
@@ -258,9 +265,7 @@ def _outputs(arguments: tuple[str, ...], folder: Path, before: dict[str, bytes])
         paths = [
             one for one in (found if isinstance(found, list) else [found]) if isinstance(one, Path)
         ]
-        is_read = not action.option_strings and command != "init" or action.dest in READ
-        is_read |= (command, action.dest) == ("fit", "certificate")
-        (read if is_read else written).update(paths)
+        (written if isinstance(action, OutputAction) else read).update(paths)
     stores = set[Path]()
     if command == "sweep":
         file = options.file if options.file.name else options.file / "nothing"
@@ -274,9 +279,6 @@ def _outputs(arguments: tuple[str, ...], folder: Path, before: dict[str, bytes])
     allowed = {_name(path, folder) for path in written} - {_name(path, folder) for path in read}
     if not getattr(options, "force", True):
         allowed -= before.keys()
-    if command == "check" and options.fix:
-        # The only files that are read and written, and asked for by that option.
-        allowed |= {_name(path, folder) for path in options.files}
     for path in stores:
         name = _name(path, folder)
         allowed |= {name + end for end in BESIDE_STORES}

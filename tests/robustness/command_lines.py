@@ -58,6 +58,7 @@ FILES = (
         "tables-readings.csv",
         "small-certificate.csv",
     ),
+    *("part.yaml", "part-readings.csv", "lengths.csv", "measured.yaml"),
     *("curve.csv", "balls.csv", "sweep.sqlite", "trials.sqlite", "planned.yaml"),
 )
 # Options whose values may be large without much work; of others a large one is meant to take long,

@@ -149,6 +149,7 @@ def _made() -> Path:
     copy_tree(DESIGNS / "npl", folder / "npl", ignore=_all_but("5."))
     texts = {
         "small.yaml": SMALL,
+        "measured.yaml": f"{SMALL}part: {{file: part.yaml}}\n",
         "pool.yaml": POOL,
         "sweep.yaml": SWEEP,
         "machine.yaml": MACHINE,

@@ -7,7 +7,7 @@ CERTIFIED = "tables.yaml tables-readings.csv --certificate tables-certificate.cs
 BAR = "bar-bell.yaml --variant 'length known'"
 GAUGE = "bryan-gauge.yaml bryan-gauge-readings.csv --variant 'radius known'"
 DUMMY = "dummy.yaml dummy-readings.csv --variant 'with scale'"
-CORNER = "--corner '44.704 mm, -114.554 mm'"
+TEST = "--mpe '3 um + L/300000' --point-repeatability '0.4 um' --draws 50"
 
 RECIPES = (
     "check small.yaml",
@@ -61,7 +61,7 @@ RECIPES = (
     "correct map.yaml small-readings.csv --probe right --with-repeatability",
     "diff map.yaml again.yaml --grid 2 -o out.csv",
     "diff machine.yaml map.yaml --stated '1 um + L/1000000' --json",
-    "diff map.yaml again.yaml --grid 2 --plot out.svg --dates 2025-01-01 2026-01-01 --fail",
+    "diff map.yaml again.yaml --grid 2 --dates 2025-01-01 2026-01-01 --fail",
     "models small.yaml small-readings.csv --coefficients 3",
     f"models {CERTIFIED} --sigma given --coefficients 3 --json",
     "validate small.yaml small-readings.csv --sigma estimated",
@@ -95,11 +95,10 @@ RECIPES = (
     "'map --curves' map.yaml",
     "'map --curves' again.yaml --error EXX --error EC0Y --points 5 --format csv",
     "map machine.yaml --line '0 mm, 0 mm, 0 mm to 600 mm, 500 mm, 400 mm' --plot out.svg",
-    "spline curve.csv --every 3 --start-value '0 um' --end-slope '1 um/mm' --plot out.svg",
+    "spline curve.csv --every 3 --start-value '0 um' --end-slope '1 um/mm'",
     "spline curve.csv --knots '50 mm, 100 mm' --json -o out.csv --powers global",
-    "spline table-1.csv --x arc_length --y finish_error --boundary '100 mm' --points 1-30 --json",
-    "spline table-1.csv --y finish_error --straight 1 --whiskers out.svg",
-    f"spline table-1.csv --y semi_finish_error --points 1-10 {CORNER} --straight 1 --straight 2 --knots none --compensated out.csv",
+    "spline table-1.csv --x arc_length --y finish_error --end '200 mm' --points 1-30 --json",
+    "spline table-1.csv --y semi_finish_error --points 1-10 --knots none -o out.csv",
     "reproduce npl --designs npl --experiment 5.2 --quick",
     "schema machine",
     "schema sweep",
@@ -107,4 +106,13 @@ RECIPES = (
     f"'run --budget' {CERTIFIED} --json",
     "init out.yaml",
     "init --machine out.yaml",
+    "part part.yaml --design small.yaml --report out.html",
+    "part part.yaml --map map.yaml --readings part-readings.csv --json",
+    "part part.yaml --design tables.yaml --draw 3 --seed 4",
+    "part part.yaml --map again.yaml --draw 2 --report out.html --json",
+    "run measured.yaml --report out.html",
+    "check --goal dimensions measured.yaml",
+    f"acceptance --design small.yaml {TEST} --probe right --report out.html",
+    f"acceptance --map map.yaml {TEST} --mpl '1 um' --gauge '0.1 um' --json",
+    "acceptance --readings lengths.csv --mpe '5 um' --probe right --report out.html",
 )

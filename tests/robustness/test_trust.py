@@ -75,6 +75,7 @@ READ: dict[str, dict[str, Any]] = {
     ),
     "MachineFileSettings.file": {"error_model": {"kind": "machine", "file": "{0}/machine.yaml"}},
     "MapPriorSettings.file": {"priors": [{"kind": "map", "file": "{0}/map.yaml"}]},
+    "PartOfExperiment.file": {"part": {"file": "{0}/part.yaml"}},
     "PointsSettings.file": {"evaluation": {"points": {"file": "{0}/points.csv"}, "probe": "down"}},
     "PythonValuesSettings.object": calibrated(**python("{0}")),
     "PythonValuesSettings.values": calibrated(**python("{0}"), values="{0}/distances.csv"),
@@ -101,6 +102,8 @@ READ: dict[str, dict[str, Any]] = {
     "TrueMapSettings.file": {"true_machine": {"kind": "map", "file": "{0}/map.yaml"}},
     # Files that a file in the right folder names.
     "a machine file's table": {"error_model": {"kind": "machine", "file": "machine.yaml"}},
+    "a part file's table": {"part": {"file": "part.yaml"}},
+    "a part file's machine": {"part": {"file": "random.yaml"}},
     "a map of a machine file": {"true_machine": {"kind": "map", "file": "machine-map.yaml"}},
     "a map in Python": {"true_machine": {"kind": "map", "file": "map.yaml"}},
     "a map as prior": {"priors": [{"kind": "map", "file": "map.yaml"}]},
@@ -150,6 +153,13 @@ MACHINE = """title: a machine
 arrangement: MB2
 volume: [1 m, 1 m, 1 m]
 errors: {{EXX: {{file: {0}/exx.csv}}}}
+"""
+PART = """part: a face
+probing: {{point_repeatability: 1 um, tip: {{diameter: 4}}}}
+places: {{there: {{origin: [300, 300, 300]}}}}
+features: {{top: {{points: {0}, fit: plane, normal: z+}}}}
+dimensions: [{{flatness: top}}]
+random_part: {1}
 """
 
 
@@ -217,6 +227,11 @@ def house(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fitted: bp.FittedMap)
     (outside / "readings.csv").write_text("position,ball,probe,x_mm,y_mm,z_mm\n")
     (outside / "machine.yaml").write_text(MACHINE.format("."))
     (inside / "machine.yaml").write_text(MACHINE.format("../outside"))
+    (outside / "face.csv").write_text("x_mm,y_mm,z_mm\n0,0,9\n50,0,9\n0,50,9\n50,50,9\n")
+    listed = "[[0, 0, 9], [50, 0, 9], [0, 50, 9]]"
+    (outside / "part.yaml").write_text(PART.format("face.csv", "machine.yaml"))
+    (inside / "part.yaml").write_text(PART.format("../outside/face.csv", "null"))
+    (inside / "random.yaml").write_text(PART.format(listed, "../outside/machine.yaml"))
     monkeypatch.chdir(inside)
     monkeypatch.setattr(sys, "path", [*sys.path, str(outside)])
     for name in [name for name in sys.modules if name == "canary"]:
@@ -260,7 +275,6 @@ def looked_at(folder: Path, sections: dict[str, Any]) -> None:
 DOORS: dict[str, Callable[[Path, dict[str, Any]], None]] = {
     "check": checked,
     "check --suggest": lambda folder, sections: checked(folder, sections, "--suggest"),
-    "check --fix": lambda folder, sections: checked(folder, sections, "--fix"),
     "studio": looked_at,
 }
 

@@ -85,7 +85,7 @@ def test_a_measuring_task_misses_its_own_target():
         found = with_values(evaluation__tasks=tasks)
         answer = judgement(found).answer
         assert answer["met"] == word and answer["within"] == 1.0
-        assert answer["shares"][1].startswith(f"{share} of the measuring tasks")
+        assert answer["shares"][1].startswith(f"{share} of the lengths of measuring tasks")
 
 
 def test_hours_are_those_of_the_order_of_least_change_over():
