@@ -100,6 +100,11 @@ def are_alike(one: str, other: str) -> bool:
     """
     if NUMBER.sub("#", one) != NUMBER.sub("#", other):
         return False
+    if "... words " in one and not one.endswith("inf"):
+        # Symmetric drawings have co-ordinates half-way between two tenths, and dozens of these are
+        # rounded either way: each changes the logarithm by some thousandths.
+        (words, total), (other_words, other_total) = (NUMBER.findall(each) for each in (one, other))
+        return bool(words == other_words and abs(float(total) - float(other_total)) <= 0.05)
     return all(map(_is_near, NUMBER.findall(one), NUMBER.findall(other)))
 
 

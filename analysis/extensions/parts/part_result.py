@@ -62,7 +62,8 @@ class DimensionUncertainty:
         if width is None or self.value is None:
             return None
         times = 2.0 if self.dimension.components is None else 1.0
-        return times * self.value.expanded_uncertainty / width
+        # Places that differ by rounding are equal, and the first of them is named.
+        return round(times * self.value.expanded_uncertainty / width, 9)
 
     @property
     def accepted(self) -> Interval:
