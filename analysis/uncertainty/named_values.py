@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from ballplate.simulator.computing.numerics import blank, eigh
+from ballplate.simulator.computing.numerics import blank, symmetric_root
 from ballplate.simulator.estimation.functions import Combinations, Displacements, Distances
 from ballplate.simulator.inputs.number_arrays import Array
 from ballplate.simulator.machines.protocol import Unit
@@ -122,7 +122,7 @@ def combined_uncertainties(combinations: Combinations, root: Array) -> tuple[Nam
     """
     values = []
     for i, of_members in enumerate(combinations.of_members):
-        members = slice(*combinations.starts[i : i + 2])
+        members = combinations.members(i)
         outside = combinations.outside[members].toarray()
         by_estimate, fixed = root[members] @ root[members].T, outside @ outside.T
         target = combinations.targets[i]
@@ -145,12 +145,11 @@ def combined_uncertainties(combinations: Combinations, root: Array) -> tuple[Nam
 
 
 def _draws(covariance: Array) -> Array:
-    """Return draws (b, m) by the symmetric root of a covariance (m, m), the only one."""
-    sizes, vectors = eigh(covariance)
-    root = (vectors * np.sqrt(np.maximum(sizes, 0.0))) @ vectors.T
+    """Return draws (b, m) by a covariance (m, m)."""
     # The same numbers for each value, whatever others there are.
     generator = np.random.default_rng(np.random.SeedSequence(0))
-    return np.asarray(generator.standard_normal((DRAWS, len(root))) @ root)
+    normal = generator.standard_normal((DRAWS, len(covariance)))
+    return np.asarray(normal @ symmetric_root(covariance))
 
 
 def _drawn(value: NamedUncertainty, errors: Array) -> NamedUncertainty:

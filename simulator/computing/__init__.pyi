@@ -11,6 +11,7 @@ from .numerics import (
     lstsq as lstsq,
     pinv as pinv,
     svd as svd,
+    symmetric_root as symmetric_root,
     versions as versions,
 )
 from .processes import (

@@ -49,6 +49,18 @@ eigvalsh = _with_second("eigvalsh", driver="ev")
 _lstsq = _with_second("lstsq", lapack_driver="gelss")
 
 
+def symmetric_root(covariance: Array) -> Array:
+    """Return the symmetric root (m, m) of a covariance (m, m). It is the only one, so that the same
+    numbers lead to the same draws everywhere.
+
+    >>> root = symmetric_root(np.array([[4.0, 2.0], [2.0, 3.0]]))
+    >>> (root @ root.T).round(12).tolist()
+    [[4.0, 2.0], [2.0, 3.0]]
+    """
+    sizes, vectors = eigh(covariance)
+    return np.asarray((vectors * np.sqrt(np.maximum(sizes, 0.0))) @ vectors.T)
+
+
 def lstsq(matrix: Array, sides: Array, rcond: float | None = None) -> Any:
     """Return the shortest least-squares solution of equations (m, n), residuals, rank and singular
     values.

@@ -213,6 +213,15 @@ class Combinations:
     targets: tuple[Target | None, ...]
     allowed: Array
 
+    def members(self, i: int) -> slice:
+        """The members of a value among all."""
+        return slice(*self.starts[i : i + 2])
+
+    @property
+    def outside_variances(self) -> Array:
+        """Variances (k,) of the members by what no estimate reduces."""
+        return np.asarray(self.outside.power(2).sum(axis=1)).ravel()
+
     def along(self, where: Array, rows: Array) -> Array:
         """Derivatives (k, s) of the members, from those of the places (n, d, s)."""
         return np.asarray(self.weights @ rows.reshape(-1, rows.shape[2]))

@@ -297,9 +297,9 @@ def _members(
     these.
     """
     functions = linear_functions(linearisation, combinations)
-    outside = np.asarray(combinations.outside.power(2).sum(axis=1)).ravel()
+    outside = combinations.outside_variances
     for i, name in enumerate(combinations.names):
-        members = slice(*combinations.starts[i : i + 2])
+        members = combinations.members(i)
         unit = combinations.units[i]
         title = name if unit == "m" else f"{name}, µ{unit}"
         some = [LinearFunctions(functions.shared[members])]

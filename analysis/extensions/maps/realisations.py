@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from ballplate.presentation import Data, as_data, given
-from ballplate.simulator.computing import eigh, single_threaded
+from ballplate.simulator.computing import single_threaded, symmetric_root
 from ballplate.simulator.machines import Array
 
 from ..machine_files import FittedMap
@@ -60,25 +60,14 @@ class Realisations:
         }
 
 
-def symmetric_root(covariance: Array, scale: Array) -> Array:
-    """The symmetric root (m, m) of a covariance of parameters in units of their `scale` (m,), back
-    in their own. It is the only one, so that the same numbers lead to the same draws everywhere.
-
-    >>> root = symmetric_root(np.array([[4.0, 2.0], [2.0, 3.0]]), np.array([2.0, 1.0]))
-    >>> (root @ root.T).round(12).tolist()
-    [[4.0, 2.0], [2.0, 3.0]]
-    """
-    values, vectors = eigh(covariance / np.outer(scale, scale))
-    return scale[:, None] * (vectors * np.sqrt(np.maximum(values, 0.0))) @ vectors.T
-
-
 @single_threaded
 def drawn_deviations(fitted: FittedMap, draws: Draws) -> Array:
     """Deviations (count, m) of all parameters of a map, offsets of probes among them, from the
     estimates, drawn from their joint covariance.
     """
-    (normal,) = draws.normal((len(fitted.scale),))
-    return normal @ symmetric_root(fitted.covariance, fitted.scale).T
+    (normal,), scale = draws.normal((len(fitted.scale),)), fitted.scale
+    # In units of the parameters' scales, which differ by many powers of ten.
+    return normal @ symmetric_root(fitted.covariance / np.outer(scale, scale)) * scale
 
 
 def drawn_machines(fitted: FittedMap, count: int, seed: int = 1) -> tuple[Array, Array]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from ballplate.presentation import percent
-from ballplate.simulator.computing import TOUCHED, single_threaded
+from ballplate.simulator.computing import TOUCHED, single_threaded, symmetric_root
 from ballplate.simulator.design import Flags, Probes, Volume
 from ballplate.simulator.estimation import linearise
 from ballplate.simulator.experiment import Experiment, lay_out
@@ -20,7 +20,6 @@ from ballplate.simulator.machines import Array, ErrorModel
 
 from ..machine_files import FittedMap
 from ..maps.correction import map_cautions
-from ..maps.realisations import symmetric_root
 from .acceptance_result import Acceptance, acceptance_of
 from .acceptance_rules import AGAIN, REPEATS, Agreed, length_plan
 from .part_uncertainty import conditions
@@ -77,7 +76,7 @@ def errors_root(machine: Corrected, ends: Array, probes: Array) -> Array:
     if (np.abs(rows @ machine.null) > TOUCHED).any():
         raise ValueError("lengths of the test are undetermined; complete the campaign first")
     root = rows @ machine.root
-    return symmetric_root(root @ root.T, np.ones(len(root)))
+    return symmetric_root(root @ root.T)
 
 
 @single_threaded

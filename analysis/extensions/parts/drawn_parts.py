@@ -15,7 +15,6 @@ from ..machine_files import FittedMap
 from ..maps.realisations import drawn_machines
 from .evaluated import evaluated
 from .part_result import PartUncertainty
-from .part_values import LaidPart
 
 # Machines whose points are fitted at once.
 AT_ONCE = 250
@@ -42,14 +41,13 @@ def machines_of_design(at: Linearisation, draws: int, seed: int) -> Machines:
 
 
 @single_threaded
-def with_draws(
-    found: PartUncertainty, laid: LaidPart, machines: Machines, seed: int
-) -> PartUncertainty:
+def with_draws(found: PartUncertainty, machines: Machines, seed: int) -> PartUncertainty:
     """Return uncertainties with those by fits to the points of drawn machines, which are drawn
     together with all sources beside the map.
     """
     model, a, offsets, drawn_a, drawn_offsets = machines
-    points, errors = laid.points, []
+    laid, errors = found.laid, []
+    points = laid.points
     x, probes = points.readings, points.probes
     before = model.error(x, a, offsets[probes])
     start = evaluated(laid, points.centres[None], True)

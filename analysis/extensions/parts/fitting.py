@@ -159,27 +159,35 @@ def fit_zone(nominal: GeometricElement, points: Array) -> tuple[GeometricElement
 
     Returns the same as `fit`.
     """
-    from scipy.optimize import linprog
-    from scipy.sparse import block_diag
-
     elements, residuals = fit(nominal, points)
     size = _size(points)
     for _ in range(ZONE_STEPS):
-        jacobian, ones = _jacobian(elements, points, size), np.ones((*residuals.shape, 1))
-        sides = np.block([[jacobian, -ones], [-jacobian, -ones]])
-        # In micrometres, beside which the tolerances of the solver are small.
-        answer = linprog(
-            np.tile(np.eye(sides.shape[2])[-1], len(sides)),
-            block_diag(sides),
-            1e6 * np.concatenate([-residuals, residuals], axis=1).ravel(),
-            bounds=(None, None),
-        )
-        step = 1e-6 * answer.x.reshape(len(sides), -1)[:, :-1]
+        step, _ = least_largest(_jacobian(elements, points, size), residuals)
         there = distances(_moved(elements, step, size), points)
         step[np.ptp(there, axis=1) > np.ptp(residuals, axis=1)] = 0.0
         elements = represented(_moved(elements, step, size), points.mean(axis=1))
         residuals = distances(elements, points)
     return elements, residuals
+
+
+def least_largest(jacobian: Array, residuals: Array) -> tuple[Array, Array]:
+    """Return steps (b, p) after which the largest of residuals (b, n) that change by derivatives
+    (b, n, p) are least, and these (b,): one linear programme.
+    """
+    from scipy.optimize import linprog
+    from scipy.sparse import block_diag
+
+    ones = np.ones((*residuals.shape, 1))
+    sides = np.block([[jacobian, -ones], [-jacobian, -ones]])
+    # In micrometres, beside which the tolerances of the solver are small.
+    answer = linprog(
+        np.tile(np.eye(sides.shape[2])[-1], len(sides)),
+        block_diag(sides),
+        1e6 * np.concatenate([-residuals, residuals], axis=1).ravel(),
+        bounds=(None, None),
+    )
+    found = 1e-6 * answer.x.reshape(len(sides), -1)
+    return found[:, :-1], found[:, -1]
 
 
 def undetermined(nominal: GeometricElement, points: Array) -> str:

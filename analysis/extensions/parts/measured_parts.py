@@ -51,14 +51,13 @@ def read_part_points(source: Path | GivenText, laid: LaidPart) -> Array:
     return found
 
 
-def with_readings(
-    found: PartUncertainty, laid: LaidPart, fitted: FittedMap, x: Array
-) -> PartUncertainty:
+def with_readings(found: PartUncertainty, fitted: FittedMap, x: Array) -> PartUncertainty:
     """Return the uncertainties of a part together with its dimensions by scale readings `x` (n, 3)
     of the tips' centres, corrected by a map and to 20 degC.
 
     :raises ValueError: points are far from where the part has them.
     """
+    laid = found.laid
     tips, _ = corrected(fitted, x, laid.points.probes)
     state = laid.part.expansion
     ratio = 1.0 + state.coefficient * (state.temperature - 20.0)
@@ -80,8 +79,7 @@ def _aligned(laid: LaidPart, tips: Array) -> Array:
     """
     found = np.empty_like(tips)
     for place in laid.part.places:
-        some = [rows for (name, _), rows in laid.points.rows.items() if name == place.name]
-        rows = slice(some[0].start, some[-1].stop)
+        rows = laid.points.in_place(place.name)
         there, here = laid.points.centres[rows], tips[rows]
         left, _, right = svd((here - here.mean(axis=0)).T @ (there - there.mean(axis=0)))
         turn = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right

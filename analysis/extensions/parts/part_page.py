@@ -34,7 +34,6 @@ def part_page(found: PartUncertainty) -> str:
 
 def part_sections(found: PartUncertainty) -> list[PageSection]:
     """Return the sections of a part's dimensions."""
-    assert found.laid is not None
     return [
         PageSection("part", "The part in the volume", still_figure(part_view(found.laid))),
         PageSection("shares", "Uncertainty by share of the tolerance", _shares(found)),
@@ -53,7 +52,6 @@ def part_for_studio(design: Design, quantity: Quantity) -> Data:
     place with U as a share of the limit.
     """
     found = part_uncertainty(design, quantity)
-    assert found.laid is not None
     return {
         "boxes": [corners for _, corners, _ in _in_places(found.laid)],
         "dimensions": [
@@ -78,8 +76,7 @@ def _in_places(laid: LaidPart) -> list[tuple[str, Array, Array]]:
     """
     points, found = laid.points, []
     for place in laid.part.places:
-        some = [rows for (name, _), rows in points.rows.items() if name == place.name]
-        surface = points.surface[some[0].start : some[-1].stop]
+        surface = points.surface[points.in_place(place.name)]
         ends = np.stack([surface.min(axis=0), surface.max(axis=0)])
         corners = ends[np.indices((2, 2, 2)).reshape(3, -1).T, np.arange(3)]
         corners, at = (those @ place.rotation.T + place.origin for those in (corners, surface))

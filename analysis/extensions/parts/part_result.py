@@ -23,7 +23,7 @@ from ballplate.simulator.inputs import CsvWriter, number_of, service
 from ballplate.uncertainty import NamedUncertainty
 
 from .part import Dimension, ShortWaves, Workpiece
-from .part_values import LaidPart, tolerance_width
+from .part_values import LaidPart, tolerance_width, widest
 
 # Standard uncertainties of a guard band, for a conformance probability of 95 % at one limit.
 GUARD = 1.6449
@@ -38,10 +38,12 @@ class DimensionUncertainty:
     """A dimension in a place with its uncertainty, None if its points or the map leave it open,
     with the `reason`.
 
-    `row` is its number, `drawn` its uncertainty by fits to
-    points of drawn machines, and `measured` its deviation from nominal by readings.
+    Its `name` has that of its place if there are several. `row` is its number, `drawn` its
+    uncertainty by fits to points of drawn machines, and `measured` its deviation from nominal by
+    readings.
     """
 
+    name: str
     dimension: Dimension
     place: str
     value: NamedUncertainty | None
@@ -51,19 +53,13 @@ class DimensionUncertainty:
     measured: float | None = None
 
     @property
-    def name(self) -> str:
-        """Its name, and its place if it has any."""
-        return self.dimension.name + (f" ({self.place})" if self.place else "")
-
-    @property
     def share_of_tolerance(self) -> float | None:
         """U as a share of the tolerance, twice U of one with two limits; None without either."""
-        width = tolerance_width(self.dimension)
+        width = widest(self.dimension)
         if width is None or self.value is None:
             return None
-        times = 2.0 if self.dimension.components is None else 1.0
         # Places that differ by rounding are equal, and the first of them is named.
-        return round(times * self.value.expanded_uncertainty / width, 9)
+        return round(self.value.expanded_uncertainty / width, 9)
 
     @property
     def accepted(self) -> Interval:
@@ -117,19 +113,22 @@ class DimensionUncertainty:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PartUncertainty(Result):
-    """Dimensions of a `part` in its places.
+    """Dimensions of a part in its places: the part on its machine is `laid`.
 
     `residual_waves` is the standard deviation of errors between those of the map that the residuals
-    of a fit allow, in metres. `qualified` states what the figures take for granted. `laid` is the
-    part on its machine.
+    of a fit allow, in metres. `qualified` states what the figures take for granted.
     """
 
     label: str
-    part: Workpiece
+    laid: LaidPart
     dimensions: tuple[DimensionUncertainty, ...]
     residual_waves: float | None = None
     qualified: tuple[str, ...] = ()
-    laid: LaidPart | None = None
+
+    @property
+    def part(self) -> Workpiece:
+        """The part."""
+        return self.laid.part
 
     def page_text(self) -> str:
         """Return its page as a file that needs no other."""
@@ -157,7 +156,6 @@ class PartUncertainty(Result):
 
     def write_points(self, stream: TextIO) -> None:
         """Write the points to be touched as CSV, the form of readings: nominal scale readings."""
-        assert self.laid is not None
         points, names = self.laid.points, self.laid.machine.names
         writer = CsvWriter(stream)
         writer.writerow(["place", "feature", "point", "probe", "x_mm", "y_mm", "z_mm"])
@@ -215,20 +213,18 @@ class PartUncertainty(Result):
             " undecided part of the tolerance is outside them",
             f"map: its share of the variance; a perfect map would leave {as_they_are} of"
             f" {len(determined)} as they are",
-            *self._probes(),
+            self._probes(),
             f"one touched point repeats to {_micro(self.part.probing.point_repeatability)} µm, as"
             " the part file states; that of a ball's centre is not this",
             f"errors shorter than the plate shows: {self._short_waves()}",
         ]
 
-    def _probes(self) -> list[str]:
-        if self.laid is None:
-            return []
+    def _probes(self) -> str:
         points, names = self.laid.points, self.laid.machine.names
         touched: dict[str, dict[str, None]] = {}
         for (_, feature), rows in points.rows.items():
             touched.setdefault(names[points.probes[rows.start]], {})[feature] = None
-        return ["touched: " + "; ".join(f"{k} {', '.join(v)}" for k, v in touched.items())]
+        return "touched: " + "; ".join(f"{k} {', '.join(v)}" for k, v in touched.items())
 
     def _short_waves(self) -> str:
         waves, residual = self.part.short_waves, self.residual_waves
@@ -298,9 +294,11 @@ def dimension_uncertainties(
         k, j = divmod(row, len(part.places))
         is_open = math.isnan(value.standard_uncertainty)
         reason = part.undetermined.get(part.dimensions[k].name, open_words) if is_open else ""
-        name = part.places[j].name if len(part.places) > 1 else ""
+        place = part.places[j].name if len(part.places) > 1 else ""
         known = None if is_open else value
-        found.append(DimensionUncertainty(part.dimensions[k], name, known, reason, row))
+        found.append(
+            DimensionUncertainty(value.name, part.dimensions[k], place, known, reason, row)
+        )
     return tuple(found)
 
 

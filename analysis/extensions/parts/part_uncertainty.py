@@ -34,7 +34,7 @@ def part_uncertainty(design: Design, quantity: Quantity) -> PartUncertainty:
     """Return the dimensions of the part of a design with the uncertainties of its quantity."""
     laid = design.once(laid_in_design)
     dimensions = dimension_uncertainties(laid.part, quantity.named, BY_DESIGN)
-    return PartUncertainty("", laid.part, dimensions, laid=laid)
+    return PartUncertainty("", laid, dimensions)
 
 
 @single_threaded
@@ -50,14 +50,13 @@ def by_design(part: Workpiece, experiment: Experiment, draws: Draws = NO_DRAWS) 
     named = combined_uncertainties(laid.combinations, root)
     found = PartUncertainty(
         experiment.label,
-        part,
+        laid,
         dimension_uncertainties(part, named, BY_DESIGN),
         qualified=conditions(experiment, at),
-        laid=laid,
     )
     if not draws.count:
         return found
-    return with_draws(found, laid, machines_of_design(at, draws.count, draws.seed), draws.seed)
+    return with_draws(found, machines_of_design(at, draws.count, draws.seed), draws.seed)
 
 
 def conditions(experiment: Experiment, at: Linearisation) -> tuple[str, ...]:
@@ -89,20 +88,18 @@ def by_map(
     waves = math.sqrt(max(largest - 1.0, 0.0)) * float(fitted.repeatability.max())
     found = PartUncertainty(
         fitted.experiment or fitted.title,
-        part,
+        laid,
         dimension_uncertainties(part, named, BY_MAP),
         waves if fitted.sigma_is_estimated else None,
         tuple(filter(None, map_cautions(fitted, COVERAGE))),
-        laid=laid,
     )
     if draws.count:
-        machines = machines_of_map(fitted, draws.count, draws.seed)
-        found = with_draws(found, laid, machines, draws.seed)
+        found = with_draws(found, machines_of_map(fitted, draws.count, draws.seed), draws.seed)
     if readings is None:
         return found
     x = read_part_points(readings, laid)
     offsets = machine.offsets[laid.points.probes] if with_offsets else 0.0
-    return with_readings(found, laid, fitted, x - offsets)
+    return with_readings(found, fitted, x - offsets)
 
 
 def _map_root(laid: LaidPart, fitted: FittedMap) -> Array:

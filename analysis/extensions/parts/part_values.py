@@ -15,6 +15,7 @@ from ballplate.simulator.inputs import Array, LengthFunction, Target
 from ballplate.uncertainty import combined_uncertainties
 
 from .datums import sensed
+from .fitting import least_largest
 from .outside_sources import outside_root
 from .part import FORMS, Dimension, Place, Workpiece
 from .touched import ProbingMachine, TouchedPoints, of_design, touched
@@ -91,7 +92,7 @@ def lay_out_part(part: Workpiece, machine: ProbingMachine) -> LaidPart:
     by_normal = csr_array(by_normal)
     along = csr_array((points.normals.ravel(), np.arange(3 * n), 3 * np.arange(n + 1)), (n, 3 * n))
     outside = outside_root(part, points, machine)
-    limits = [limit(part, one.dimension) for one in laid]
+    widths = [widest(one.dimension) for one in laid]
     combinations = Combinations(
         MeasuredPoints(points.readings, points.probes),
         by_normal @ along,
@@ -102,8 +103,10 @@ def lay_out_part(part: Workpiece, machine: ProbingMachine) -> LaidPart:
         tuple(one.dimension.unit for one in laid),
         np.array([one.dimension.nominal for one in laid]),
         tuple(
-            None if largest is None else Target(LengthFunction(largest), COVERAGE)
-            for largest in limits
+            None
+            if width is None
+            else Target(LengthFunction(part.share_of_tolerance * width), COVERAGE)
+            for width in widths
         ),
         np.full(start, np.nan),
     )
@@ -132,14 +135,14 @@ def tolerance_width(dimension: Dimension) -> float | None:
     return None if lower is None or upper is None else upper - lower
 
 
-def limit(part: Workpiece, dimension: Dimension) -> float | None:
-    """Return the largest expanded uncertainty that a dimension may have: the share of its tolerance
-    that the part states, of two limits the half of it.
+def widest(dimension: Dimension) -> float | None:
+    """Return the expanded uncertainty that takes the whole tolerance, of two limits the half of it;
+    None without one.
     """
     width = tolerance_width(dimension)
-    if width is None:
-        return None
-    return part.share_of_tolerance * width / (2.0 if dimension.components is None else 1.0)
+    if width is None or dimension.components is not None:
+        return width
+    return width / 2.0
 
 
 def _errors(
@@ -217,27 +220,18 @@ def _zone(
     """Return minimum zones (b,) of least-squares residuals (b, k): the smallest range after any
     change of the element, to which they are perpendicular.
     """
-    from scipy.optimize import linprog
-    from scipy.sparse import csr_array, eye_array, kron
-
     square = matrix[:, points.rows[laid.place.name, laid.dimension.features[0]]].toarray()
     vectors, sizes, _ = svd(square)
-    free, ones = vectors[:, sizes < 0.5], np.ones((len(square), 1))
-    sides = csr_array(np.block([[free, -ones, 0 * ones], [-free, 0 * ones, ones]]))
-    cost = np.array([0.0] * free.shape[1] + [1.0, -1.0])
+    # All elements with a form can move all points alike: the zone reaches as far to both sides.
+    free = vectors[:, sizes < 0.5]
 
     def zones(members: Array) -> Array:
         found = []
         for start in range(0, len(members), ZONES_AT_ONCE):
-            # In micrometres, beside which the tolerances of the solver are small.
-            some = 1e6 * members[start : start + ZONES_AT_ONCE]
-            answer = linprog(
-                np.tile(cost, len(some)),
-                kron(eye_array(len(some)), sides),
-                np.concatenate([-some, some], axis=1).ravel(),
-                bounds=(None, None),
+            some = members[start : start + ZONES_AT_ONCE]
+            found.append(
+                2.0 * least_largest(np.broadcast_to(free, (len(some), *free.shape)), some)[1]
             )
-            found.append(1e-6 * answer.x.reshape(len(some), -1) @ cost)
         return np.concatenate(found)
 
     return zones
@@ -248,12 +242,12 @@ def _with_allowed(combinations: Combinations) -> Combinations:
     value that is not linear, in the proportion that it has without a map.
     """
     allowed = np.full(combinations.weights.shape[0], np.nan)
-    outside = np.sqrt(np.asarray(combinations.outside.power(2).sum(axis=1)).ravel())
+    outside = np.sqrt(combinations.outside_variances)
     without_map = combined_uncertainties(combinations, np.zeros((len(outside), 1)))
     for i, value in enumerate(without_map):
         if value.target is None or math.isnan(value.standard_uncertainty):
             continue
-        members = slice(*combinations.starts[i : i + 2])
+        members = combinations.members(i)
         largest = float(outside[members].max())
         # Of a form of three points both are zero, but for rounding.
         factor = value.expanded_uncertainty / (largest or 1.0) or COVERAGE

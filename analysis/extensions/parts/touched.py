@@ -51,6 +51,11 @@ class TouchedPoints:
         """Nominal centres (n, 3) of tips in the frame of the part."""
         return self.surface + self.radii[:, None] * self.of_part
 
+    def in_place(self, name: str) -> slice:
+        """Return the rows of all points in a place."""
+        some = [rows for (place, _), rows in self.rows.items() if place == name]
+        return slice(some[0].start, some[-1].stop)
+
 
 def of_design(design: Design) -> ProbingMachine:
     """Return the machine of a design, with the probe of its evaluation points first."""

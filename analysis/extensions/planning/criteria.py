@@ -547,7 +547,7 @@ def _combinations(
     """
     allowed = combinations.allowed
     for i, name in enumerate(combinations.names):
-        if (allowed[slice(*combinations.starts[i : i + 2])] <= 0.0).any():
+        if (allowed[combinations.members(i)] <= 0.0).any():
             text = (
                 f"no plan holds the limit of {name}, which is exceeded without any uncertainty of"
                 " the map; widen it"

@@ -105,7 +105,7 @@ def measured_errors(
                 turned = Rotation.from_rotvec(1e-4 * rng.normal(size=3)).as_matrix() @ rotation
                 tips = centres @ turned.T + origin + 1e-4 * rng.normal(size=3)
                 x.append(truth.machine.readings(tips, truth.a, truth.offsets[probes]))
-            told = with_readings(found, found.laid, fitted, np.concatenate(x))
+            told = with_readings(found, fitted, np.concatenate(x))
             errors[i, j] = [one.measured for one in told.dimensions]
     return found, errors - true
 
